@@ -1,0 +1,1 @@
+"""The node graph, launch files and the mine-loc command."""

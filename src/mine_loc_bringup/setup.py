@@ -1,0 +1,15 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="mine_loc_bringup",
+    version="0.1.0",
+    packages=find_packages(),
+    package_data={"mine_loc_bringup": ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/mine_loc_bringup"]),
+        ("share/mine_loc_bringup", ["package.xml"]),
+    ],
+    description="The node graph, launch files and the mine-loc command.",
+    license="Apache-2.0",
+    entry_points={"console_scripts": []},
+)

@@ -1,0 +1,1 @@
+"""Time alignment and fusion: one pose per person."""

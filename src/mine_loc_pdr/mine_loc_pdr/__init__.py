@@ -1,0 +1,1 @@
+"""FDILink, attitude, steps, stride: pedestrian dead reckoning from a waist-worn N100."""

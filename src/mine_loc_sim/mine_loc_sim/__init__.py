@@ -1,0 +1,1 @@
+"""A mine to test in: channel, walkers, emulators that speak bytes."""

@@ -1,0 +1,1 @@
+"""DWM1000 wire formats, range correction, position solving."""
