@@ -1,1 +1,1 @@
-"""What all of mine_loc shares: integer time, framing, parameters, site model, geometry, error measures, the node base."""
+"""What all of mine_loc shares: time, framing, parameters, site model, geometry, error measures, node base."""

@@ -70,7 +70,9 @@ def parameter(
 def constraints(kind: type) -> dict[str, tuple[type, Any, Constraint]]:
     """Name → (type, default, constraint) of every parameter of a parameter dataclass."""
     hints = get_type_hints(kind)
-    return {f.name: (hints[f.name], f.default, f.metadata[_KEY]) for f in dataclasses.fields(kind) if _KEY in f.metadata}
+    return {
+        f.name: (hints[f.name], f.default, f.metadata[_KEY]) for f in dataclasses.fields(kind) if _KEY in f.metadata
+    }
 
 
 def from_mapping(kind: type[P], values: Mapping[str, Any], where: str = "parameters") -> P:
@@ -83,15 +85,28 @@ def from_mapping(kind: type[P], values: Mapping[str, Any], where: str = "paramet
     for name in values:
         if name not in known:
             raise ConfigurationError(f"{where}: {name}: no such parameter; allowed: {', '.join(known)}")
-    return kind(**{name: _checked(f"{where}: {name}", values[name], *known[name]) for name in values})
+    return kind(
+        **{name: _checked(f"{where}: {name}", value, known[name][0], known[name][2]) for name, value in values.items()}
+    )
 
 
-def _checked(where: str, value: Any, kind: type, default: Any, constraint: Constraint) -> Any:
-    del default
+def _checked(where: str, value: Any, kind: type, constraint: Constraint) -> Any:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise ConfigurationError(f"{where}: {value!r} is a {type(value).__name__}, expected {kind.__name__}: {constraint.allowed()}")
+        raise ConfigurationError(
+            f"{where}: {value!r} is a {type(value).__name__}, expected {kind.__name__}: {constraint.allowed()}"
+        )
     if not constraint.admits(value):
         raise ConfigurationError(f"{where}: {value!r} is not allowed; allowed: {constraint.allowed()}")
     return value
+
+
+@dataclass(frozen=True)
+class NodeParameters:
+    """What every node takes."""
+
+    site: str = parameter("", "folder that holds site.yaml and people.yaml", read_only=True)
+    autostart: bool = parameter(
+        True, "configure and activate at start; false leaves it to a lifecycle manager", read_only=True
+    )

@@ -1,0 +1,17 @@
+"""The quality of service of every kind of topic (table in docs/topics.md)."""
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+EVENTS = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE)
+"""Rounds, steps, epochs, poses, verdicts: few a second, none may be lost on the way."""
+
+STREAM = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Subscriptions to IMU samples and CIR frames: a lost one is better than a queue."""
+
+LATCHED = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""Maps and device descriptions: late subscribers get the last one."""

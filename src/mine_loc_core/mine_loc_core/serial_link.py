@@ -1,0 +1,163 @@
+"""A serial line that may vanish: device, pty or TCP bridge, read by a thread into a bounded queue.
+
+The port is resolved anew at every connection, so a device that comes back under another name is found again:
+a path, a glob pattern (`/dev/ttyACM*`), `socket://host:port`, or `hwgrep://VID:PID` (pyserial's URL handlers).
+"""
+
+import glob
+import os
+import random
+import select
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import serial
+
+_READ_SIZE = 4096
+_POLL_S = 0.2
+_FIRST_RETRY_S = 0.2
+_LAST_RETRY_S = 2.0
+_QUEUE_CHUNKS = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Bytes and the instant they were read, by the clock given to the link. No bytes = a new connection."""
+
+    arrival_ns: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStatus:
+    """State of the line: the port in use (empty = none), why it is down, and counters."""
+
+    port: str
+    error: str
+    connections: int
+    bytes_read: int
+    bytes_dropped: int
+    silent_s: float
+
+
+class SerialLink:
+    """Reads a port for ever: reconnects with back-off and jitter, never raises from its thread.
+
+    `wake` is called from the reader thread after something was queued. `silence_s` closes a line that stayed silent
+    for so long, because a TCP bridge that lost power does not say so.
+    """
+
+    def __init__(
+        self, port: str, baud: int, *, clock: Callable[[], int], wake: Callable[[], None], silence_s: float = 5.0
+    ) -> None:
+        self._pattern = port
+        self._baud = baud
+        self._clock = clock
+        self._wake = wake
+        self._silence_s = silence_s
+        self._queue: deque[Chunk] = deque()
+        self._stop = threading.Event()
+        self._port: serial.SerialBase | None = None
+        self._name = ""
+        self._error = "not opened yet"
+        self._connections = self._bytes_read = self._bytes_dropped = 0
+        self._last_heard = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name=f"serial {port}", daemon=True)
+
+    def start(self) -> None:
+        """Start reading."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop reading and close the port; returns within a second."""
+        self._stop.set()
+        self._thread.join(timeout=1.0)
+
+    def take(self) -> list[Chunk]:
+        """All chunks since the last call, in order."""
+        chunks = []
+        while self._queue:
+            chunks.append(self._queue.popleft())
+        return chunks
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the device; a line that is down swallows them, as unplugged cables do."""
+        port = self._port
+        if port is None or not data:
+            return
+        try:
+            port.write(data)
+        except (OSError, serial.SerialException) as error:
+            self._error = str(error)
+
+    @property
+    def status(self) -> LinkStatus:
+        """State of the line now."""
+        silent_s = time.monotonic() - self._last_heard
+        return LinkStatus(self._name, self._error, self._connections, self._bytes_read, self._bytes_dropped, silent_s)
+
+    def _run(self) -> None:
+        retry_s = _FIRST_RETRY_S
+        while not self._stop.is_set():
+            if self._open():
+                retry_s = _FIRST_RETRY_S
+                self._read_until_it_fails()
+                self._close()
+            self._stop.wait(retry_s * random.uniform(0.5, 1.0))  # noqa: S311 jitter, not a secret
+            retry_s = min(2 * retry_s, _LAST_RETRY_S)
+
+    def _open(self) -> bool:
+        for name in self._candidates():
+            try:
+                self._port = serial.serial_for_url(name, self._baud, timeout=0, write_timeout=1.0, exclusive=True)
+            except (OSError, ValueError, serial.SerialException) as error:
+                self._error = str(error)
+                continue
+            self._name, self._error = name, ""
+            self._connections += 1
+            self._last_heard = time.monotonic()
+            self._put(b"")
+            return True
+        return False
+
+    def _candidates(self) -> list[str]:
+        if "://" in self._pattern:
+            return [self._pattern]
+        names = sorted(glob.glob(self._pattern))  # noqa: PTH207 patterns are absolute
+        if not names:
+            self._error = f"no such port: {self._pattern}"
+        return names
+
+    def _read_until_it_fails(self) -> None:
+        assert self._port is not None
+        descriptor = self._port.fileno()
+        try:
+            while not self._stop.is_set():
+                if not select.select([descriptor], [], [], _POLL_S)[0]:
+                    if time.monotonic() - self._last_heard > self._silence_s:
+                        self._error = f"silent for {self._silence_s:g} s"
+                        return
+                    continue
+                data = os.read(descriptor, _READ_SIZE)
+                if not data:
+                    self._error = "closed by the other side"
+                    return
+                self._last_heard = time.monotonic()
+                self._put(data)
+        except (OSError, ValueError) as error:
+            self._error = str(error)
+
+    def _put(self, data: bytes) -> None:
+        self._bytes_read += len(data)
+        if len(self._queue) >= _QUEUE_CHUNKS:
+            self._bytes_dropped += len(self._queue.popleft().data)
+        self._queue.append(Chunk(self._clock(), data))
+        self._wake()
+
+    def _close(self) -> None:
+        port, self._port, self._name = self._port, None, ""
+        if port is not None:
+            port.close()
