@@ -9,7 +9,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/mine_loc_core"]),
         ("share/mine_loc_core", ["package.xml"]),
     ],
-    description="What all of mine_loc shares: time, framing, parameters, site model, geometry, error measures, node base.",
+    description="What all of mine_loc shares",
     license="Apache-2.0",
     entry_points={"console_scripts": []},
 )
