@@ -4,7 +4,7 @@ setup(
     name="mine_loc_core",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"mine_loc_core": ["py.typed"]},
+    package_data={"mine_loc_core": ["py.typed", "schema/*.json"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/mine_loc_core"]),
         ("share/mine_loc_core", ["package.xml"]),
