@@ -1,0 +1,16 @@
+"""Gates stated as a probability."""
+
+import functools
+import math
+
+from scipy.stats import chi2
+
+
+@functools.cache
+def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
+    """Value that a χ² variable stays below with this probability: the threshold of a Mahalanobis gate."""
+    if not 0.0 < probability < 1.0:
+        raise ValueError(f"probability {probability} is not within (0, 1)")
+    if degrees_of_freedom == 2:
+        return -2.0 * math.log(1.0 - probability)
+    return float(chi2.ppf(probability, degrees_of_freedom))

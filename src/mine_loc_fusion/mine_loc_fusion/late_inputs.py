@@ -1,0 +1,54 @@
+"""Late inputs: a bounded history of states, from which the estimator is run again with the late input in its place."""
+
+from collections import deque
+from typing import Any
+
+from mine_loc_core.verdicts import Reason, Source, Verdict
+from mine_loc_fusion.estimate import EpochInputs, Estimate, Estimator
+
+
+class LateInputCorrector:
+    """An estimator that takes epochs out of order, `history_ns` back."""
+
+    def __init__(self, estimator: Estimator, history_ns: int) -> None:
+        self._estimator = estimator
+        self._history_ns = history_ns
+        self._history: deque[tuple[EpochInputs, Any]] = deque()  # (inputs, state before them), in order of stamp
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Stamp of the newest epoch used."""
+        return self._history[-1][0].stamp_ns if self._history else None
+
+    def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
+        """Use an epoch; an old one by rewinding. Beyond the history its measurements are refused as stale."""
+        replay: list[EpochInputs] = []
+        if self._history and inputs.stamp_ns < self._history[0][0].stamp_ns:
+            return _stale(inputs)
+        while self._history and self._history[-1][0].stamp_ns > inputs.stamp_ns:
+            later, state = self._history.pop()
+            replay.append(later)
+            self._estimator.restore(state)
+        verdicts = self._step(inputs)
+        for later in reversed(replay):
+            self._step(later)
+        self._drop_old()
+        return verdicts
+
+    def estimate(self, stamp_ns: int) -> Estimate | None:
+        """See Estimator."""
+        return self._estimator.estimate(stamp_ns)
+
+    def _step(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
+        self._history.append((inputs, self._estimator.save()))
+        return self._estimator.update(inputs)
+
+    def _drop_old(self) -> None:
+        oldest_ns = self._history[-1][0].stamp_ns - self._history_ns
+        while len(self._history) > 1 and self._history[0][0].stamp_ns < oldest_ns:
+            self._history.popleft()
+
+
+def _stale(inputs: EpochInputs) -> tuple[Verdict, ...]:
+    positions = tuple(Verdict(Source.UWB_POSE, 0, Reason.STALE) for _ in inputs.positions)
+    return positions + tuple(Verdict(Source.STEP, 0, Reason.STALE) for _ in inputs.steps)

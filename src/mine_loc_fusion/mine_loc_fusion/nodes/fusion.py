@@ -1,0 +1,201 @@
+"""One pose per person: epochs in, poses, transforms, verdicts and health out."""
+
+import math
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from mine_loc_core.health import Health, Level
+from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.nodes.verdict_messages import to_verdict_array
+from mine_loc_core.people import PeopleFile
+from mine_loc_core.site import load_site
+from mine_loc_core.stamps import to_ns
+from mine_loc_interfaces import msg
+from mine_loc_interfaces.srv import Reset
+from tf2_msgs.msg import TFMessage
+
+from mine_loc_fusion.estimate import Estimate
+from mine_loc_fusion.nodes.messages import los_fraction, to_inputs, to_person_pose, to_transform
+from mine_loc_fusion.parameters import FusionParameters
+from mine_loc_fusion.tracked_person import TrackedPerson
+
+_PERIOD_S = 1.0
+
+
+class Fusion(NodeBase):
+    """Runs one estimator a person."""
+
+    parameter_class = FusionParameters
+
+    def __init__(self) -> None:
+        super().__init__("fusion")
+
+    def configure(self) -> None:
+        """Load site and people; a bad file refuses the transition."""
+        folder = Path(self.parameters.site)
+        self._site = load_site(folder)
+        self._people = PeopleFile(folder)
+        self._tracked: dict[str, TrackedPerson] = {}
+        self._pose_publishers: dict[str, object] = {}
+        self._array = self.publish_to(msg.PersonPoseArray, "fused/poses", EVENTS)
+        self._verdicts = self.publish_to(msg.MeasurementVerdictArray, "fused/verdicts", EVENTS)
+        self._health = self.publish_to(msg.FusionHealth, "fused/health", EVENTS)
+        self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
+        self._take_people()
+        self.serve(Reset, "~/reset", self._reset)
+        self.every(self.parameters.coast_period_s, self._coast)
+        self.every(_PERIOD_S, self._each_second)
+        self.subscribe(msg.Epoch, "sync/epochs", self._on_epoch, EVENTS)
+
+    def parameters_changed(self) -> None:
+        """New parameters start new estimators."""
+        self._tracked.clear()
+        self._take_people()
+
+    def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
+        """Estimates rest on stamps that no longer hold."""
+        for tracked in self._tracked.values():
+            tracked.reset()
+
+    def health(self) -> Iterable[Health]:
+        """How many people are positioned."""
+        now_ns = self.now_ns()
+        modes = {name: tracked.mode(now_ns).name for name, tracked in self._tracked.items()}
+        yield Health("people", Level.OK, f"{len(modes)} people", modes)
+        if self._people.error:
+            yield Health("people.yaml", Level.WARN, self._people.error)
+
+    def _take_people(self) -> None:
+        people = self._people.people
+        for name in [name for name in self._tracked if people.by_name(name) is None]:
+            del self._tracked[name]
+            self.destroy_lifecycle_publisher(self._pose_publishers.pop(name))
+        for person in people:
+            tracked = self._tracked.get(person.name)
+            if tracked is None:
+                self._tracked[person.name] = TrackedPerson(person, self.parameters)
+            else:
+                tracked.person = person
+            if person.name not in self._pose_publishers:
+                publisher = self.publish_to(PoseWithCovarianceStamped, f"people/{person.name}/pose", EVENTS)
+                if self.active:
+                    publisher.on_activate(None)
+                self._pose_publishers[person.name] = publisher
+
+    def _on_epoch(self, epoch: msg.Epoch) -> None:
+        tracked = self._tracked.get(epoch.person)
+        if tracked is None:
+            return
+        started = time.perf_counter()
+        inputs = to_inputs(epoch)
+        verdicts = tracked.update(inputs, late=epoch.late)
+        tracked.costs_s.append(time.perf_counter() - started)
+        if epoch.ranges:
+            tracked.los_fraction = los_fraction(epoch)
+        if epoch.steps:
+            position = epoch.steps[-1].position
+            tracked.odom_position_m = (position.x, position.y, position.z)
+        if verdicts:
+            stamp, frame = epoch.header.stamp, self._site.map_frame
+            self._verdicts.publish(to_verdict_array(verdicts, stamp, frame, person=epoch.person))
+        if not epoch.late:
+            self._publish([tracked], inputs.stamp_ns)
+
+    def _coast(self) -> None:
+        """Whoever was not heard of lately is published from prediction, so that the output never stops."""
+        now_ns = self.now_ns()
+        silent_ns = to_ns(self.parameters.coast_period_s)
+        self._publish(
+            [t for t in self._tracked.values() if t.published_ns is not None and now_ns - t.published_ns > silent_ns], now_ns
+        )
+
+    def _publish(self, people: Iterable[TrackedPerson], stamp_ns: int) -> None:
+        outputs = [(tracked, estimate) for tracked in people if (estimate := tracked.output(stamp_ns))]
+        if not outputs:
+            return
+        array = msg.PersonPoseArray(instance=self.parameters.instance)
+        array.header.frame_id = self._site.map_frame
+        array.header.stamp = to_time(max(estimate.stamp_ns for _, estimate in outputs))
+        transforms = TFMessage()
+        for tracked, estimate in outputs:
+            person = tracked.person
+            pose = to_person_pose(
+                person.name, person.tag_id, estimate, self._height_m(tracked), tracked.los_fraction
+            )
+            array.people.append(pose)
+            stamped = PoseWithCovarianceStamped(pose=pose.pose)
+            stamped.header.frame_id = self._site.map_frame
+            stamped.header.stamp = pose.stamp
+            self._pose_publishers[person.name].publish(stamped)
+            transforms.transforms.extend(self._transforms(tracked, estimate))
+        self._array.publish(array)
+        self._tf.publish(transforms)
+
+    def _transforms(self, tracked: TrackedPerson, estimate: Estimate) -> Iterable:
+        """map → odom, placed so that odom → base_link (of dead reckoning) ends at the estimate (REP 105)."""
+        name = tracked.person.name
+        yaw = estimate.yaw_offset_rad or 0.0
+        ox, oy, oz = tracked.odom_position_m
+        x = float(estimate.position_m[0]) - (math.cos(yaw) * ox - math.sin(yaw) * oy)
+        y = float(estimate.position_m[1]) - (math.sin(yaw) * ox + math.cos(yaw) * oy)
+        z = self._height_m(tracked) - oz
+        yield to_transform(self._site.map_frame, f"{name}/odom", estimate.stamp_ns, x, y, z, yaw)
+        if tracked.person.n100 is None:  # nobody dead-reckons: the tree is completed here
+            yield to_transform(f"{name}/odom", f"{name}/base_link", estimate.stamp_ns, 0.0, 0.0, 0.0, 0.0)
+
+    def _height_m(self, tracked: TrackedPerson) -> float:
+        height_m = tracked.person.tag_height_m
+        return self._site.tag_height_m if height_m is None else height_m
+
+    def _each_second(self) -> None:
+        if self._people.poll() is not None:
+            self._take_people()
+        now_ns = self.now_ns()
+        for name, tracked in self._tracked.items():
+            self._health.publish(self._to_health(name, tracked, now_ns))
+
+    def _to_health(self, name: str, tracked: TrackedPerson, now_ns: int) -> msg.FusionHealth:
+        costs = np.percentile(tracked.costs_s, [50, 99]) if tracked.costs_s else (0.0, 0.0)
+        by_reason = np.zeros(32, dtype=np.uint64)
+        for reason, count in tracked.reasons.items():
+            by_reason[int(reason)] = count
+        accepted = int(by_reason[msg.MeasurementVerdict.ACCEPTED])
+        by_reason[msg.MeasurementVerdict.ACCEPTED] = 0
+        message = msg.FusionHealth(
+            person=name,
+            mode=int(tracked.mode(now_ns)),
+            epochs=tracked.epochs,
+            late_epochs=tracked.late_epochs,
+            accepted=accepted,
+            rejected=int(by_reason.sum()),
+            processing_p50=float(costs[0]),
+            processing_p99=float(costs[1]),
+            nis=tracked.nis,
+        )
+        message.rejected_by_reason = by_reason
+        message.header.stamp = to_time(now_ns)
+        message.header.frame_id = self._site.map_frame
+        return message
+
+    def _reset(self, request: Reset.Request) -> tuple[bool, str]:
+        if request.person and request.person not in self._tracked:
+            return False, f"nobody called {request.person!r}; known: {', '.join(self._tracked)}"
+        chosen = [request.person] if request.person else list(self._tracked)
+        for name in chosen:
+            self._tracked[name].reset()
+        return True, f"forgot {', '.join(chosen)}"
+
+
+def main() -> int:
+    """Entry point."""
+    return run(Fusion)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,167 @@
+"""Time alignment: inputs of many sources become epochs of one person, in order, each input used exactly once.
+
+A ranging round opens an epoch, which goes out as soon as its companions (the position solved from it, its link states)
+are there or a few milliseconds have passed. What is late by nature (steps) is not waited for: it follows in an epoch
+marked late, and the fusion corrects with it.
+"""
+
+from collections import Counter, OrderedDict
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.verdicts import Reason
+
+_REMEMBERED_INPUTS = 512
+_LINK_STATES_EXPECTED_NS = 2 * NS_PER_S
+
+
+class Kind(Enum):
+    """Kinds of input; the values are the fields of mine_loc_interfaces/Epoch."""
+
+    RANGES = "ranges"
+    TDOA = "tdoa"
+    UWB_POSE = "uwb_poses"
+    LINK_STATE = "link_states"
+    STEP = "steps"
+    LANDMARK = "landmark_fixes"
+
+
+_COMPANIONS = (Kind.UWB_POSE, Kind.LINK_STATE)
+
+
+@dataclass(frozen=True, slots=True)
+class SyncInput:
+    """One input: `source` and `seq` identify it, `links` is the number of link states a round may get."""
+
+    person: str
+    kind: Kind
+    source: Hashable
+    seq: int
+    stamp_ns: int
+    payload: Any
+    links: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Epoch:
+    """All that belongs to one instant of one person."""
+
+    person: str
+    seq: int
+    stamp_ns: int
+    late: bool
+    inputs: dict[Kind, list[Any]]
+
+
+@dataclass(slots=True)
+class _Open:
+    stamp_ns: int
+    deadline_ns: int
+    links: int
+    inputs: dict[Kind, list[Any]] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Person:
+    open: dict[int, _Open] = field(default_factory=dict)
+    last_stamp_ns: int | None = None
+    seq: int = 0
+    seen: OrderedDict[Hashable, None] = field(default_factory=OrderedDict)
+    newest_of_source: dict[Hashable, int] = field(default_factory=dict)
+    link_state_heard_ns: int | None = None
+
+
+class Synchroniser:
+    """The reorder buffer of all people. Times are ROS time in ns; the caller passes `now_ns`, so it is deterministic."""
+
+    def __init__(self, *, companion_wait_ns: int, history_ns: int, future_ns: int, max_open: int) -> None:
+        self._companion_wait_ns = companion_wait_ns
+        self._history_ns = history_ns
+        self._future_ns = future_ns
+        self._max_open = max_open
+        self._people: dict[str, _Person] = {}
+        self.used = 0
+        self.refused: Counter[Reason] = Counter()
+        self.late = 0
+
+    @property
+    def waiting(self) -> bool:
+        """Whether an epoch is open."""
+        return any(person.open for person in self._people.values())
+
+    def push(self, item: SyncInput, now_ns: int) -> tuple[list[Epoch], Reason]:
+        """Take an input; the epochs that are complete now, and whether the input was taken (ACCEPTED) or why not."""
+        person = self._people.setdefault(item.person, _Person())
+        reason = self._judge(person, item, now_ns)
+        if reason is not Reason.ACCEPTED:
+            self.refused[reason] += 1
+            return self.poll(now_ns), reason
+        self.used += 1
+        if item.kind is Kind.LINK_STATE:
+            person.link_state_heard_ns = now_ns
+        epoch = person.open.get(item.stamp_ns)
+        if epoch is None:
+            wait_ns = self._companion_wait_ns if item.kind in (Kind.RANGES, *_COMPANIONS) else 0
+            epoch = person.open[item.stamp_ns] = _Open(item.stamp_ns, now_ns + wait_ns, item.links)
+        epoch.links = max(epoch.links, item.links)
+        epoch.inputs.setdefault(item.kind, []).append(item.payload)
+        return self._emit(item.person, person, now_ns), reason
+
+    def poll(self, now_ns: int) -> list[Epoch]:
+        """The epochs whose time to wait is over."""
+        return [epoch for name, person in self._people.items() for epoch in self._emit(name, person, now_ns)]
+
+    def reset(self) -> None:
+        """Time jumped: forget all stamps. What was open is lost and counted as overflow."""
+        for person in self._people.values():
+            self.refused[Reason.OVERFLOW] += sum(len(v) for epoch in person.open.values() for v in epoch.inputs.values())
+        self._people = {name: _Person(seq=person.seq) for name, person in self._people.items()}
+
+    def forget(self, person: str) -> None:
+        """Release a person who is no longer in the people file."""
+        self._people.pop(person, None)
+
+    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:
+        if item.stamp_ns > now_ns + self._future_ns:
+            return Reason.FUTURE
+        identity = (item.kind, item.source, item.seq, item.stamp_ns)
+        if identity in person.seen:
+            return Reason.DUPLICATE
+        newest_ns = person.newest_of_source.get((item.kind, item.source))
+        if newest_ns is not None and item.stamp_ns < newest_ns and item.kind is not Kind.LINK_STATE:
+            return Reason.BACKWARD
+        if person.last_stamp_ns is not None and item.stamp_ns < person.last_stamp_ns - self._history_ns:
+            return Reason.STALE
+        person.seen[identity] = None
+        if len(person.seen) > _REMEMBERED_INPUTS:
+            person.seen.popitem(last=False)
+        person.newest_of_source[item.kind, item.source] = item.stamp_ns
+        return Reason.ACCEPTED
+
+    def _emit(self, name: str, person: _Person, now_ns: int) -> list[Epoch]:
+        """In order of stamp, up to the newest that is due: one that still waits goes out with a later one."""
+        due = [e.stamp_ns for e in person.open.values() if now_ns >= e.deadline_ns or self._complete(person, e, now_ns)]
+        overfull = sorted(person.open)[: max(0, len(person.open) - self._max_open)]
+        last_ns = max([*due, *overfull], default=None)
+        if last_ns is None:
+            return []
+        epochs = []
+        for stamp_ns in sorted(stamp for stamp in person.open if stamp <= last_ns):
+            opened = person.open.pop(stamp_ns)
+            late = person.last_stamp_ns is not None and stamp_ns <= person.last_stamp_ns
+            self.late += late
+            person.seq += 1
+            epochs.append(Epoch(name, person.seq, stamp_ns, late, opened.inputs))
+            if not late:
+                person.last_stamp_ns = stamp_ns
+        return epochs
+
+    def _complete(self, person: _Person, epoch: _Open, now_ns: int) -> bool:
+        if Kind.RANGES not in epoch.inputs:
+            return False
+        heard_ns = person.link_state_heard_ns
+        expected = epoch.links if heard_ns is not None and now_ns - heard_ns < _LINK_STATES_EXPECTED_NS else 0
+        return Kind.UWB_POSE in epoch.inputs and len(epoch.inputs.get(Kind.LINK_STATE, ())) >= expected

@@ -1,0 +1,150 @@
+"""The serial line of a DW1000 kit: bytes to ranges, time differences and CIR frames."""
+
+import sys
+import time
+from collections.abc import Iterable
+
+from mine_loc_core.health import Health, Level
+from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.serial_link import SerialLink
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArray
+
+from mine_loc_uwb.device_stamps import DeviceStamps
+from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array, to_tdoa_array
+from mine_loc_uwb.parameters import Dwm1000DriverParameters
+from mine_loc_uwb.ranging import CirWindow, Message, RangingRound, TdoaBlink
+from mine_loc_uwb.wire.detect import AutoDetect, make_decoder
+from mine_loc_uwb.wire.starting import make_starter
+
+_FRAME = "uwb_tag_link"
+
+
+class Dwm1000Driver(NodeBase):
+    """Reads one port for ever and publishes what its messages say, stamped with the instant of measurement."""
+
+    parameter_class = Dwm1000DriverParameters
+    needs_guard_condition = True
+
+    def __init__(self) -> None:
+        super().__init__("dwm1000_driver")
+
+    def configure(self) -> None:
+        """Create publishers and decoder; nothing is opened yet."""
+        self._ranges = self.publish_to(UwbRangeArray, "uwb/ranges", EVENTS)
+        self._tdoa = self.publish_to(TdoaArray, "uwb/tdoa", EVENTS)
+        self._cir = self.publish_to(CirFrame, "uwb/cir", EVENTS)
+        self._info = self.publish_to(DeviceInfo, "~/device_info", LATCHED)
+        self._arrived = self.create_guard_condition(self.guarded(self._read, "serial data"))
+        self.every(0.05, self._talk)
+
+    def activate(self) -> None:
+        """Open the port, now or as soon as it appears."""
+        p = self.parameters
+        self._decoder = AutoDetect() if p.format == "auto" else make_decoder(p.format)
+        self._starter = make_starter(p.format)
+        self._stamps = self._new_stamps()
+        self._announced = ""
+        self._messages = 0
+        self._losses_before = 0
+        self._last_message = time.monotonic()
+        self._link = SerialLink(p.port, p.baud, clock=self.now_ns, wake=self._arrived.trigger)
+        self._link.start()
+
+    def deactivate(self) -> None:
+        """Close the port."""
+        self._link.stop()
+
+    def parameters_changed(self) -> None:
+        """Latency and trust in the device's clock take effect at once."""
+        self._stamps = self._new_stamps()
+
+    def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
+        """Offsets learnt against the old time are void."""
+        self._stamps.forget()
+
+    def health(self) -> Iterable[Health]:
+        """The line, and what is decoded from it."""
+        status = self._link.status
+        silent_s = time.monotonic() - self._last_message
+        if not status.port:
+            yield Health("port", Level.ERROR, status.error, {"port": self.parameters.port})
+        elif silent_s > self.parameters.silence_s:
+            yield Health("port", Level.ERROR, f"no message for {silent_s:.1f} s", {"port": status.port})
+        else:
+            yield Health("port", Level.OK, f"reading {status.port}", {"connections": status.connections})
+        losses = sum(self._decoder.losses.values())
+        level = Level.WARN if losses > self._losses_before else Level.OK
+        self._losses_before = losses
+        figures = {
+            "messages": self._messages,
+            "lost_rounds": self._stamps.lost_rounds,
+            "clock_resets": self._stamps.clock_resets,
+            "bytes": status.bytes_read,
+            "bytes_dropped": status.bytes_dropped,
+        }
+        yield Health("decoder", level, self._decoder.name, figures | dict(self._decoder.losses))
+
+    def _new_stamps(self) -> DeviceStamps:
+        latency_ns = round(self.parameters.latency_ms * NS_PER_MS)
+        return DeviceStamps(latency_ns=latency_ns, trust_device_clock=self.parameters.trust_device_clock)
+
+    def _read(self) -> None:
+        for chunk in self._link.take():
+            if not chunk.data:
+                self._decoder.reset()
+                self._starter.reset()
+                self._stamps.forget()
+                continue
+            self._starter.observe(chunk.data)
+            for message in self._decoder.feed(chunk.data):
+                self._publish(message, chunk.arrival_ns)
+
+    def _publish(self, message: Message, arrival_ns: int) -> None:
+        self._messages += 1
+        self._last_message = time.monotonic()
+        if self._decoder.name != self._announced:
+            self._announce()
+        if isinstance(message, RangingRound):
+            key = (message.reporter_id, message.tag_id)
+            stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
+            seq = self._stamps.number(key, self._decoder, message.seq)
+            tick_ns = self._decoder.tick_period_s * NS_PER_S
+            self._ranges.publish(
+                to_range_array(message, seq, stamp, _FRAME, tick_ns, self.parameters.range_sd_m)
+            )
+        elif isinstance(message, TdoaBlink):
+            key = (message.reference_anchor_id,)
+            stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
+            seq = self._stamps.number((*key, message.tag_id), self._decoder, message.seq)
+            self._tdoa.publish(to_tdoa_array(message, seq, stamp, _FRAME))
+        elif isinstance(message, CirWindow) and self._cir.get_subscription_count():
+            key = (message.anchor_id, message.tag_id)
+            stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
+            self._cir.publish(to_cir_frame(message, stamp, _FRAME))
+
+    def _announce(self) -> None:
+        self._announced = self._decoder.name
+        info = DeviceInfo(
+            device="DW1000",
+            port=self._link.status.port,
+            wire_format=self._decoder.name,
+            tick_period=self._decoder.tick_period_s,
+            counter_bits=self._decoder.counter_bits,
+        )
+        info.header.stamp = self.get_clock().now().to_msg()
+        self._info.publish(info)
+
+    def _talk(self) -> None:
+        alive = time.monotonic() - self._last_message < self.parameters.silence_s
+        self._link.write(self._starter.poll(time.monotonic_ns(), stream_alive=alive))
+
+
+def main() -> int:
+    """Entry point."""
+    return run(Dwm1000Driver)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
