@@ -1,5 +1,6 @@
 from binascii import crc_hqx
 from math import isnan, nan
+from pathlib import Path
 from struct import pack
 
 import numpy as np
@@ -12,6 +13,7 @@ from mine_loc_uwb.received_power import Reception, Sfd, powers_dbm
 from mine_loc_uwb.wire.mine_loc_frame import MineLocDecoder, encode_frame
 from mine_loc_uwb.wire.mine_loc_payload import FrameType, encode_cir, encode_ranges, encode_tdoa
 
+SPECIFICATION = Path(__file__).parents[3] / "docs" / "wire-formats.md"
 RECEPTION = Reception(47_700, (1404, 1657, 1179), 42, 10_854, 101, 90, 5, 64, Sfd.STANDARD_8)
 ROUND = RangingRound(
     0xDECA01, 0x22, 1000, 123_456_789, (Range(0xA1, 12.345, clock_offset_ppm=-2.5, ticks_offset=1500),), corrected=False
@@ -54,13 +56,18 @@ def same(a, b):
     return repr(a) == repr(b)
 
 
-def test_the_documented_frame_encodes_to_the_documented_bytes():
-    assert ranges_frame(7).hex(" ") == (
-        "55 57 01 01 46 00 07 00 "
-        "01 ca de 00 00 00 00 00 22 00 00 00 00 00 00 00 15 cd 5b 07 00 00 00 00 e8 03 00 00 00 01 "
-        "a1 00 00 00 00 00 00 00 39 30 00 00 dc 05 00 00 3c f6 ff ff 54 ba 7c 05 79 06 9b 04 2a 00 66 2a 65 00 5a 00 "
-        "05 40 01 00 " + pack("<H", crc_hqx(ranges_frame(7)[2:-2], 0)).hex(" ")
-    )
+@pytest.mark.parametrize(
+    "frame",
+    [
+        ranges_frame(7),
+        encode_frame(FrameType.TDOA, 8, encode_tdoa(BLINK)),
+        encode_frame(FrameType.CIR, 9, encode_cir(window(2, 744))),
+    ],
+)
+def test_the_examples_of_the_specification_are_what_is_encoded(frame):
+    blocks = SPECIFICATION.read_text(encoding="utf-8").split("\n\n")
+    examples = [bytes.fromhex(block) for block in blocks if block.startswith("    55 57 ")]
+    assert frame in examples
 
 
 def test_ranges_decode_with_powers_from_the_registers():
