@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Found(Generic[T]):
-    """A good frame: its content (None = good but of no interest) and its length on the wire in bytes."""
+    """A good frame: its content (None = good but of no interest) and its length on the wire in bytes (at least 1)."""
 
     frame: T | None
     length: int
@@ -41,7 +41,7 @@ class FrameScanner(Generic[T]):
 
     `start` is the byte sequence every frame begins with; `parse(buffer, offset)` judges the bytes from `offset`, where
     `start` stands. A parser must answer Damaged rather than Incomplete for a length beyond its cap, which bounds the
-    memory held here.
+    memory held here. `losses` counts failed checks by their kind and, as `skipped_bytes`, every byte outside a frame.
     """
 
     def __init__(self, start: bytes, parse: Parse[T]) -> None:
@@ -56,21 +56,22 @@ class FrameScanner(Generic[T]):
         buffer = self._buffer
         buffer += data
         frames: list[T] = []
-        offset = 0
-        while (offset := self._next_start(offset)) >= 0:
+        offset = self._skip_to_start(0)
+        while buffer.startswith(self._start, offset):
             result = self._parse(buffer, offset)
+            if isinstance(result, Incomplete):
+                break
             if isinstance(result, Found):
                 self.frames += 1
                 offset += result.length
                 if result.frame is not None:
                     frames.append(result.frame)
-            elif isinstance(result, Damaged):
-                self.losses[result.kind] += 1
-                offset += 1
-                self.losses["skipped_bytes"] += 1
             else:
-                break
-        del buffer[: offset if offset >= 0 else self._drop_tail()]
+                self.losses[result.kind] += 1
+                self._count_skipped(1)
+                offset += 1
+            offset = self._skip_to_start(offset)
+        del buffer[:offset]
         return frames
 
     def reset(self) -> None:
@@ -78,20 +79,16 @@ class FrameScanner(Generic[T]):
         self._count_skipped(len(self._buffer))
         self._buffer.clear()
 
-    def _next_start(self, offset: int) -> int:
-        found = self._buffer.find(self._start, offset)
-        if found >= 0:
-            self._count_skipped(found - offset)
-        else:
-            self._unsearched = offset
+    def _skip_to_start(self, offset: int) -> int:
+        """Where the next frame, or at the end of the buffer the beginning of its start sequence, stands."""
+        buffer, start = self._buffer, self._start
+        found = buffer.find(start, offset)
+        if found < 0:
+            tail = min(len(start) - 1, len(buffer) - offset)
+            partial = next((n for n in range(tail, 0, -1) if buffer.endswith(start[:n])), 0)
+            found = len(buffer) - partial
+        self._count_skipped(found - offset)
         return found
-
-    def _drop_tail(self) -> int:
-        """No start in sight: keep only what may be the beginning of one."""
-        keep = next((n for n in range(len(self._start) - 1, 0, -1) if self._buffer.endswith(self._start[:n])), 0)
-        end = max(len(self._buffer) - keep, self._unsearched)
-        self._count_skipped(end - self._unsearched)
-        return end
 
     def _count_skipped(self, count: int) -> None:
         if count:
