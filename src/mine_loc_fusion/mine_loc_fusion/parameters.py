@@ -12,7 +12,9 @@ class SynchroniserParameters(NodeParameters):
     companion_wait_ms: float = parameter(
         8.0, "how long a ranging round waits for its position and link states", unit="ms", low=0.0, high=200.0
     )
-    history_s: float = parameter(2.0, "inputs older than the last epoch by more are stale", unit="s", low=0.1, high=30.0)
+    history_s: float = parameter(
+        2.0, "inputs older than the last epoch by more are stale", unit="s", low=0.1, high=30.0
+    )
     future_ms: float = parameter(50.0, "stamps ahead of now by more are refused", unit="ms", low=0.0, high=10_000.0)
     max_open: int = parameter(64, "open epochs a person; the oldest goes out when there are more", low=1, high=1024)
 
@@ -22,11 +24,19 @@ class FusionParameters(NodeParameters):
     """One pose per person."""
 
     instance: str = parameter("fusion", "name of this instance in its outputs", read_only=True)
-    acceleration_sd: float = parameter(1.0, "how abruptly people change speed, over one second", unit="m/s^2", low=0.01, high=20.0)
+    acceleration_sd: float = parameter(
+        1.0, "how abruptly people change speed, over one second", unit="m/s^2", low=0.01, high=20.0
+    )
     gate_probability: float = parameter(0.999, "share of good positions that pass", unit="1", low=0.5, high=0.999999)
-    reopen_s: float = parameter(2.0, "positions refused for so long start the filter anew", unit="s", low=0.1, high=60.0)
-    uwb_timeout_s: float = parameter(1.0, "no position for so long: dead reckoning or coasting", unit="s", low=0.1, high=60.0)
-    step_timeout_s: float = parameter(2.0, "no step for so long: standing, or no step detector", unit="s", low=0.1, high=60.0)
+    reopen_s: float = parameter(
+        2.0, "positions refused for so long start the filter anew", unit="s", low=0.1, high=60.0
+    )
+    uwb_timeout_s: float = parameter(
+        1.0, "no position for so long: dead reckoning or coasting", unit="s", low=0.1, high=60.0
+    )
+    step_timeout_s: float = parameter(
+        2.0, "no step for so long: standing, or no step detector", unit="s", low=0.1, high=60.0
+    )
     lost_ce95_m: float = parameter(50.0, "a circle of 95 % beyond it means lost", unit="m", low=1.0, high=1000.0)
     coast_period_s: float = parameter(0.2, "outputs without inputs come this often", unit="s", low=0.02, high=5.0)
     history_s: float = parameter(2.0, "late inputs are corrected this far back", unit="s", low=0.1, high=30.0)

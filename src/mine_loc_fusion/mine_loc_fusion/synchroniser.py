@@ -75,7 +75,7 @@ class _Person:
 
 
 class Synchroniser:
-    """The reorder buffer of all people. Times are ROS time in ns; the caller passes `now_ns`, so it is deterministic."""
+    """The reorder buffer of all people. Times are ROS time in ns; `now_ns` is given, so it is deterministic."""
 
     def __init__(self, *, companion_wait_ns: int, history_ns: int, future_ns: int, max_open: int) -> None:
         self._companion_wait_ns = companion_wait_ns
@@ -117,7 +117,9 @@ class Synchroniser:
     def reset(self) -> None:
         """Time jumped: forget all stamps. What was open is lost and counted as overflow."""
         for person in self._people.values():
-            self.refused[Reason.OVERFLOW] += sum(len(v) for epoch in person.open.values() for v in epoch.inputs.values())
+            self.refused[Reason.OVERFLOW] += sum(
+                len(v) for epoch in person.open.values() for v in epoch.inputs.values()
+            )
         self._people = {name: _Person(seq=person.seq) for name, person in self._people.items()}
 
     def forget(self, person: str) -> None:

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from mine_loc_interfaces import msg
+from mine_loc_interfaces.srv import Reset
+from tf2_msgs.msg import TFMessage
+
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import to_ns
-from mine_loc_interfaces import msg
-from mine_loc_interfaces.srv import Reset
-from tf2_msgs.msg import TFMessage
-
 from mine_loc_fusion.estimate import Estimate
 from mine_loc_fusion.nodes.messages import los_fraction, to_inputs, to_person_pose, to_transform
 from mine_loc_fusion.parameters import FusionParameters
@@ -112,7 +112,8 @@ class Fusion(NodeBase):
         now_ns = self.now_ns()
         silent_ns = to_ns(self.parameters.coast_period_s)
         self._publish(
-            [t for t in self._tracked.values() if t.published_ns is not None and now_ns - t.published_ns > silent_ns], now_ns
+            [t for t in self._tracked.values() if t.published_ns is not None and now_ns - t.published_ns > silent_ns],
+            now_ns,
         )
 
     def _publish(self, people: Iterable[TrackedPerson], stamp_ns: int) -> None:
@@ -125,9 +126,7 @@ class Fusion(NodeBase):
         transforms = TFMessage()
         for tracked, estimate in outputs:
             person = tracked.person
-            pose = to_person_pose(
-                person.name, person.tag_id, estimate, self._height_m(tracked), tracked.los_fraction
-            )
+            pose = to_person_pose(person.name, person.tag_id, estimate, self._height_m(tracked), tracked.los_fraction)
             array.people.append(pose)
             stamped = PoseWithCovarianceStamped(pose=pose.pose)
             stamped.header.frame_id = self._site.map_frame

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped, Vector3
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_interfaces import msg
 
+from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_fusion.estimate import EpochInputs, Estimate, PositionFix, StepFix
 from mine_loc_fusion.pose_filter import ce95_m
 

@@ -5,6 +5,8 @@ from collections.abc import Hashable, Iterable
 from pathlib import Path
 from typing import Any
 
+from mine_loc_interfaces import msg
+
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
@@ -12,8 +14,6 @@ from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_MS, to_ns
-from mine_loc_interfaces import msg
-
 from mine_loc_fusion.parameters import SynchroniserParameters
 from mine_loc_fusion.synchroniser import Epoch, Kind, Synchroniser, SyncInput
 
@@ -43,7 +43,10 @@ class SynchroniserNode(NodeBase):
         self.subscribe(msg.TdoaArray, "uwb/tdoa", lambda m: self._on_tag(Kind.TDOA, m, m.seq), EVENTS)
         self.subscribe(msg.UwbPose, "uwb/pose", lambda m: self._on_tag(Kind.UWB_POSE, m, m.seq), EVENTS)
         self.subscribe(
-            msg.LinkState, "uwb/link_state", lambda m: self._on_tag(Kind.LINK_STATE, m, m.range_seq, m.anchor_id), EVENTS
+            msg.LinkState,
+            "uwb/link_state",
+            lambda m: self._on_tag(Kind.LINK_STATE, m, m.range_seq, m.anchor_id),
+            EVENTS,
         )
         self.subscribe(msg.Step, "pdr/steps", lambda m: self._on_person(Kind.STEP, m, m.count), EVENTS)
         self.subscribe(msg.LandmarkFix, "pdr/landmark_fix", lambda m: self._on_person(Kind.LANDMARK, m, 0), EVENTS)

@@ -4,13 +4,13 @@ import sys
 import time
 from collections.abc import Iterable
 
+from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArray
+
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.serial_link import SerialLink
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
-from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArray
-
 from mine_loc_uwb.device_stamps import DeviceStamps
 from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array, to_tdoa_array
 from mine_loc_uwb.parameters import Dwm1000DriverParameters
@@ -111,9 +111,7 @@ class Dwm1000Driver(NodeBase):
             stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
             seq = self._stamps.number(key, self._decoder, message.seq)
             tick_ns = self._decoder.tick_period_s * NS_PER_S
-            self._ranges.publish(
-                to_range_array(message, seq, stamp, _FRAME, tick_ns, self.parameters.range_sd_m)
-            )
+            self._ranges.publish(to_range_array(message, seq, stamp, _FRAME, tick_ns, self.parameters.range_sd_m))
         elif isinstance(message, TdoaBlink):
             key = (message.reference_anchor_id,)
             stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)

@@ -2,10 +2,10 @@
 
 import math
 
-from mine_loc_core.device_clock import DeviceStamp
-from mine_loc_core.nodes.conversions import to_time
 from mine_loc_interfaces.msg import CirFrame, TdoaArray, TdoaDifference, UwbRange, UwbRangeArray
 
+from mine_loc_core.device_clock import DeviceStamp
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_uwb.ranging import DW1000_TAP_S, CirWindow, Range, RangingRound, TdoaBlink
 from mine_loc_uwb.received_power import los_probability_from_powers
 

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from geometry_msgs.msg import PoseWithCovariance
+from mine_loc_interfaces.msg import Anchor, AnchorMap, MeasurementVerdictArray, UwbPose, UwbRangeArray
+from mine_loc_interfaces.srv import SetAnchorEnabled
+
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_point
 from mine_loc_core.nodes.node_base import NodeBase, run
@@ -13,9 +16,6 @@ from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
-from mine_loc_interfaces.msg import Anchor, AnchorMap, MeasurementVerdictArray, UwbPose, UwbRangeArray
-from mine_loc_interfaces.srv import SetAnchorEnabled
-
 from mine_loc_uwb.fix import Fix, FixStatus
 from mine_loc_uwb.parameters import UwbSolverParameters
 from mine_loc_uwb.round_solver import MeasuredRange, RoundSolver
