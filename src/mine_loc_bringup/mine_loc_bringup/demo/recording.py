@@ -1,0 +1,59 @@
+"""What the demonstration plays: bytes for serial lines, and the truth to report against."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from mine_loc_core.errors import ConfigurationError
+
+Array = npt.NDArray[np.float64]
+DATA_VARIABLE = "MINE_LOC_DATA"
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Positions (n, 3) [m] of one person at increasing `times_s` of the truth's own clock, in the truth's own frame."""
+
+    person: str
+    times_s: Array
+    positions_m: Array
+    shared_clock_and_frame: bool = False
+    """Simulated truth needs no alignment; it is reported without."""
+
+
+Burst = tuple[float, bytes]
+"""Seconds since the recording began, and the bytes the device sends then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A recording ready to be played.
+
+    `site` names the folder under config/ that describes the place; `lines` maps `receiver` or `person/n100` to what
+    that serial line carries, in order of time.
+    """
+
+    source: str
+    site: str
+    lines: Mapping[str, Sequence[Burst]]
+    truths: Sequence[Truth]
+
+    @property
+    def rounds(self) -> int:
+        """Number of bursts on the lines of the receivers."""
+        return sum(len(bursts) for name, bursts in self.lines.items() if "/" not in name)
+
+
+def data_file(*parts: str) -> Path:
+    """A file of the public recordings. Raises ConfigurationError when they are not here."""
+    folder = os.environ.get(DATA_VARIABLE, "")
+    path = Path(folder, *parts)
+    if not folder or not path.exists():
+        raise ConfigurationError(
+            f"{DATA_VARIABLE}={folder!r}: {Path(*parts)} is not there; allowed: the folder of public recordings"
+        )
+    return path

@@ -1,0 +1,34 @@
+"""The laboratory run `m1l` of trek1000_bielefeld (Sang et al., WPNC 2019), re-encoded as the kit's `mc` lines."""
+
+from math import nan
+
+import numpy as np
+import scipy.io
+
+from mine_loc_bringup.demo.recording import Burst, Recording, Truth, data_file
+from mine_loc_uwb.ranging import Range, RangingRound
+from mine_loc_uwb.wire.trek1000 import encode_round
+
+
+def load() -> Recording:
+    """Ranges of a carried tag to four anchors at 10 Hz, Vicon truth on a clock and in a frame of its own."""
+    rows = np.loadtxt(data_file("trek1000_bielefeld", "exp_data", "UWB_data_Ranges", "output_range_uwb_m1l.txt"))
+    ms_of_day = _ms_of_day(rows[:, 0].astype(np.int64))
+    bursts = [
+        ((int(ms) - int(ms_of_day[0])) / 1e3, encode_round(_round(i, int(ms), row[2:6])))
+        for i, (ms, row) in enumerate(zip(ms_of_day, rows, strict=True))
+    ]
+    vicon = scipy.io.loadmat(data_file("trek1000_bielefeld", "exp_data", "Vicon_mat", "m1L.mat"))["posedata_uwb"]
+    times_s = (vicon[:, 1] - vicon[0, 1]) + vicon[:, 2] * 1e-9
+    lines: dict[str, list[Burst]] = {"trek": bursts}
+    return Recording("trek1000_bielefeld m1l", "trek_lab", lines, [Truth("walker", times_s, vicon[:, 3:6])])
+
+
+def _ms_of_day(hhmmssmmm: np.ndarray) -> np.ndarray:
+    hours, minutes, ms = hhmmssmmm // 10_000_000, hhmmssmmm // 100_000 % 100, hhmmssmmm % 100_000
+    return (hours * 60 + minutes) * 60_000 + ms
+
+
+def _round(number: int, ms: int, ranges_mm: np.ndarray) -> RangingRound:
+    ranges = [Range(i + 1, mm / 1e3 if mm > 0 else nan) for i, mm in enumerate(ranges_mm)]
+    return RangingRound(1, 0, number % 256, ms, tuple(ranges), corrected=True)
