@@ -1,5 +1,6 @@
 """From site and people to the processes that serve them."""
 
+import itertools
 import sys
 from pathlib import Path
 
@@ -61,14 +62,17 @@ def test_the_command_runs_the_module_under_its_ros_name():
 
 
 def test_values_of_parameters_keep_their_type_on_the_way_through_yaml():
-    process = NodeProcess("k", "m", "n", "/", {"a": "off", "b": 1, "c": 1.0, "d": True, "e": "*: &ü"}, None)
-    values = [
-        word.partition(":=")[2]
-        for word in process.command
-        if word[1:] != "p" and word[:2] in {f"{c}:" for c in "abcde"}
-    ]
-    assert [yaml.safe_load(value) for value in values] == ["off", 1, 1.0, True, "*: &ü"]
-    assert [type(yaml.safe_load(value)) for value in values] == [str, int, float, bool, str]
+    given = {"a": "off", "b": 1, "c": 1.0, "d": True, "e": "*: &ü😀", "f": "7"}
+    command = NodeProcess("k", "m", "n", "/", given, None).command
+    words = [word for flag, word in itertools.pairwise(command) if flag == "-p"]
+    read = {name: yaml.safe_load(value) for name, _, value in (word.partition(":=") for word in words)}
+    assert read == given
+    assert [type(value) for value in read.values()] == [type(value) for value in given.values()]
+
+
+def test_a_parameter_file_comes_before_what_the_graph_gives_so_that_the_graph_wins():
+    command = NodeProcess("k", "m", "n", "/", {"site": "s"}, Path("p.yaml")).command
+    assert command.index("--params-file") + 1 == command.index("p.yaml") < command.index("-p")
 
 
 def test_simulated_time_is_passed_to_every_node_when_asked_for():

@@ -138,9 +138,10 @@ def up(site: Path, tmp_path: Path):
         running.process.kill()
 
 
-def test_up_runs_a_process_a_node_and_stops_them_on_ctrl_c(up):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_up_runs_a_process_a_node_and_stops_them_when_asked(up, number):
     up.until("[uwb_solver] at LOCALHOST", "[fitter/n100_driver] at LOCALHOST", "[driver/n100_driver] at LOCALHOST")
-    up.process.send_signal(signal.SIGINT)
+    up.process.send_signal(number)
     up.until("[uwb_solver] stopped", "[fitter/n100_driver] stopped", "[driver/n100_driver] stopped")
     assert up.process.wait(DEADLINE_S) == 0
 

@@ -13,6 +13,7 @@ from mine_loc_core.parameters import parameter
 @dataclass(frozen=True)
 class SolverKnobs:
     gate: float = parameter(0.99, "share of good ranges that pass", low=0.5, high=0.9999)
+    reach: float = parameter(90.0, "longest range", unit="m", low=1.0, high=300.0)
     method: str = parameter("lm", "solver", choices=("lm", "gn"))
 
 
@@ -43,13 +44,14 @@ HEAD = "/**:\n  ros__parameters:\n"
     ("text", "says"),
     [
         (HEAD + "    gate: 7\n", "solver.yaml:3: gate: 7.0 is not allowed; allowed: 0.5 to 0.9999"),
+        (HEAD + "    reach: 90\n", "solver.yaml:3: reach: 90 is a whole number, which ROS refuses here; allowed: 90.0"),
         (HEAD + "    gate: .nan\n", "solver.yaml:3: gate: nan is not allowed"),
         (HEAD + "    gate: high\n", "solver.yaml:3: gate: 'high' is a str, expected float: 0.5 to 0.9999"),
         (
             HEAD + "    gate: 0.9\n    method: newton\n",
             "solver.yaml:4: method: 'newton' is not allowed; allowed: one of lm, gn",
         ),
-        (HEAD + "    gait: 0.9\n", "solver.yaml:3: gait: no such parameter; allowed: gate, method"),
+        (HEAD + "    gait: 0.9\n", "solver.yaml:3: gait: no such parameter; allowed: gate, reach, method"),
         (HEAD + "    port: /dev/x\n", "solver.yaml:3: port: comes from the site or people file"),
         ("gate: 0.9\n", "solver.yaml:1: gate: 0.9 is not allowed; allowed: a mapping, node name → ros__parameters"),
         ("/**:\n  ros__parameters: 3\n", "solver.yaml:2: /**.ros__parameters: 3 is not allowed; allowed: a mapping"),
