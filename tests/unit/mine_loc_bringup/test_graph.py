@@ -9,6 +9,7 @@ import yaml
 
 from mine_loc_bringup.graph import NodeProcess, discovery_environment, expand, read_graph
 from mine_loc_core.errors import ConfigurationError
+from mine_loc_core.parameters import constraints
 from mine_loc_core.people import People, load_people
 from mine_loc_core.site import Discovery, load_site
 
@@ -111,3 +112,10 @@ def test_every_package_of_the_graph_is_one_of_ours():
 def test_discovery_is_what_the_site_says(discovery, range_, peers):
     expected = {"ROS_AUTOMATIC_DISCOVERY_RANGE": range_, "ROS_STATIC_PEERS": peers}
     assert discovery_environment(discovery) == expected
+
+
+@pytest.mark.parametrize("spec", read_graph(), ids=lambda spec: spec.key)
+def test_a_node_takes_every_parameter_that_the_graph_gives_it(spec):
+    module, _, name = spec.parameter_class.partition(":")
+    taken = constraints(getattr(pytest.importorskip(module), name))
+    assert set(spec.parameters) | {"site"} <= set(taken)
