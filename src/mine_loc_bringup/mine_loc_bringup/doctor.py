@@ -28,6 +28,8 @@ _MODULES = {  # import name → (name on PyPI, package of Debian and Ubuntu)
 _TOOLS = {"g++": "g++", "make": "make", "git": "git"}
 _ROS_PROBE = """
 import rclpy, mine_loc_interfaces.msg
+rclpy.init()
+rclpy.create_node("doctor").create_publisher(mine_loc_interfaces.msg.PersonPoseArray, "doctor", 1)
 print(rclpy.get_rmw_implementation_identifier())
 """
 _STEADY_CLOCKS = {"tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"}
@@ -117,10 +119,11 @@ def _version(distribution: str) -> str:
 
 
 def check_ros(timeout_s: float = 30.0) -> Finding:
-    """Whether ROS 2, a middleware and our messages load: tried out in a process of its own."""
+    """Whether a node can publish our messages: tried out in a process of its own, which no other node discovers."""
     command = [sys.executable, "-c", _ROS_PROBE]
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
     try:
-        result = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=True)
+        result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=timeout_s, check=True)
     except subprocess.SubprocessError as error:
         output = (getattr(error, "stderr", None) or "").strip()
         remedy = "make setup, then . ./env.sh (full ROS: source its setup.bash, then the workspace's)"

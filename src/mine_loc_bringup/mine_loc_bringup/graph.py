@@ -62,7 +62,7 @@ class NodeProcess:
         if self.parameter_file:
             words += ["--params-file", str(self.parameter_file)]
         for name, value in self.parameters.items():
-            words += ["-p", f"{name}:={json.dumps(value)}"]
+            words += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
         return words
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.parameters import from_mapping
+from mine_loc_core.parameters import constraints, from_mapping
 from mine_loc_core.yaml_source import KeyPath, YamlSource, load_yaml, refuse
 
 _PARAMETERS = "ros__parameters"
@@ -51,6 +51,9 @@ def _problems(source: YamlSource, kind: type[Any], given: frozenset[str]) -> Ite
                 from_mapping(kind, {name: value}, line)
             except ConfigurationError as error:
                 yield str(error)
+                continue
+            if type(value) is int and constraints(kind)[name][0] is float:
+                yield f"{line}: {name}: {value} is a whole number, which ROS refuses here; allowed: {float(value)}"
 
 
 def _sections(source: YamlSource, content: Any, path: KeyPath) -> Iterator[tuple[KeyPath, dict[str, Any]]]:

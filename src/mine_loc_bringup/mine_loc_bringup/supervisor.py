@@ -17,6 +17,7 @@ FIRST_DELAY_S = 0.1
 LONGEST_DELAY_S = 10.0
 HEALTHY_S = 30.0  # a process that ran this long starts its back-off afresh
 PATIENCE_S = 1.5  # between SIGINT and SIGKILL
+_LAST_WORDS_S = 0.2  # for output still in the pipe; longer only if somebody left the group and holds it open
 _LONGEST_LINE = 1 << 16
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _LIBC = ctypes.CDLL(None)
@@ -144,13 +145,14 @@ class Supervisor:
         asked.cancel()
         _signal_group(process.pid, signal.SIGKILL)  # also whatever the process left behind in its group
         status = await exited
-        await reading
+        await asyncio.wait({reading}, timeout=_LAST_WORDS_S)
+        reading.cancel()
         return Event(kind, name, process.pid, status)
 
     async def _spawn(
         self, name: str, command: tuple[str, ...]
     ) -> tuple[asyncio.subprocess.Process, asyncio.Task[None]]:
-        """Start the command in a group of its own, its output read by a task that ends with the group's last member.
+        """Start the command in a group of its own, its output read by a task.
 
         The pipe is not asyncio's own, because asyncio may not report an exit while somebody holds the pipe open.
         """
@@ -174,18 +176,18 @@ class Supervisor:
 
     async def _read(self, name: str, read_end: int) -> None:
         reader = asyncio.StreamReader(limit=_LONGEST_LINE)
-        with os.fdopen(read_end, "rb", buffering=0) as pipe:
-            protocol = asyncio.StreamReaderProtocol(reader)
-            transport, _ = await asyncio.get_running_loop().connect_read_pipe(lambda: protocol, pipe)
+        transport, _ = await asyncio.get_running_loop().connect_read_pipe(
+            lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(read_end, "rb", buffering=0)
+        )
+        with contextlib.closing(transport):
             while True:
                 try:
                     line = await reader.readline()
                 except ValueError:  # StreamReader has dropped what exceeded the limit
                     line = b"(output without line end was dropped)\n"
                 if not line:
-                    break
+                    return
                 self._on_line(name, line.decode("utf-8", "replace").rstrip("\r\n"))
-            transport.close()
 
 
 def _signal_group(pid: int, number: signal.Signals) -> None:

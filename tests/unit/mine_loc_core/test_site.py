@@ -5,6 +5,7 @@ import math
 import re
 from pathlib import Path
 
+import jsonschema
 import pytest
 import yaml
 
@@ -182,3 +183,18 @@ def test_anchors_that_a_vehicle_carries_are_placed_in_its_own_frame(tmp_path):
 def test_discovery_off_needs_no_quotes(tmp_path):
     (written(tmp_path, GOOD) / "site.yaml").open("a").write("discovery:\n  range: off\n")
     assert load_site(tmp_path).discovery.range == "off"
+
+
+@pytest.mark.parametrize("name", ["site", "people"])
+def test_the_documentation_names_every_key_of_the_schema(name):
+    documentation = (CONFIG.parent / "docs/site-files.md").read_text()
+    schema = read_schema(name)
+    objects = [schema, *schema["$defs"].values(), *schema["$defs"].get("person", {}).get("properties", {}).values()]
+    keys = {key for part in objects for key in part.get("properties", {})}
+    assert len(keys) > 10
+    assert [key for key in sorted(keys) if f"`{key}`" not in documentation] == []
+
+
+@pytest.mark.parametrize("name", ["site", "people"])
+def test_the_published_schemas_are_valid_schemas(name):
+    jsonschema.Draft202012Validator.check_schema(read_schema(name))

@@ -1,0 +1,121 @@
+"""From site and people to the processes that serve them."""
+
+import itertools
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from mine_loc_bringup.graph import NodeProcess, discovery_environment, expand, read_graph
+from mine_loc_core.errors import ConfigurationError
+from mine_loc_core.parameters import constraints
+from mine_loc_core.people import People, load_people
+from mine_loc_core.site import Discovery, load_site
+
+ROOT = Path(__file__).parents[3]
+FOLDER = ROOT / "config/example_mine"
+SITE = load_site(FOLDER)
+PEOPLE = load_people(FOLDER)
+
+
+def node(name: str, **options) -> NodeProcess:
+    return next(process for process in expand(SITE, PEOPLE, FOLDER, **options) if process.name == name)
+
+
+def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_and_one_of_each_else():
+    assert [process.name for process in expand(SITE, PEOPLE, FOLDER)] == [
+        "dwm1000_driver_portal",
+        "dwm1000_driver_junction",
+        "uwb_solver",
+        "fitter/n100_driver",
+        "driver/n100_driver",
+        "pdr",
+        "synchroniser",
+        "fusion",
+    ]
+
+
+def test_a_receiver_s_driver_is_told_its_line():
+    assert node("dwm1000_driver_junction").parameters == {
+        "site": str(FOLDER),
+        "receiver": "junction",
+        "port": "socket://192.168.10.13:8234",
+        "baud": 115200,
+        "format": "mine_loc",
+    }
+
+
+def test_an_n100_s_driver_lives_in_its_person_s_namespace():
+    driver = node("fitter/n100_driver")
+    assert (driver.namespace, driver.node_name) == ("/fitter", "n100_driver")
+    assert driver.parameters["person"] == "fitter"
+    assert driver.parameters["port"] == "socket://192.168.10.41:8234"
+
+
+def test_the_command_runs_the_module_under_its_ros_name():
+    assert node("fitter/n100_driver").command == [
+        *(sys.executable, "-m", "mine_loc_pdr.nodes.n100_driver", "--ros-args"),
+        *("-r", "__node:=n100_driver", "-r", "__ns:=/fitter"),
+        *("-p", f'site:="{FOLDER}"', "-p", 'person:="fitter"'),
+        *("-p", 'port:="socket://192.168.10.41:8234"', "-p", "baud:=921600"),
+    ]
+
+
+def test_values_of_parameters_keep_their_type_on_the_way_through_yaml():
+    given = {"a": "off", "b": 1, "c": 1.0, "d": True, "e": "*: &ü😀", "f": "7"}
+    command = NodeProcess("k", "m", "n", "/", given, None).command
+    words = [word for flag, word in itertools.pairwise(command) if flag == "-p"]
+    read = {name: yaml.safe_load(value) for name, _, value in (word.partition(":=") for word in words)}
+    assert read == given
+    assert [type(value) for value in read.values()] == [type(value) for value in given.values()]
+
+
+def test_a_parameter_file_comes_before_what_the_graph_gives_so_that_the_graph_wins():
+    command = NodeProcess("k", "m", "n", "/", {"site": "s"}, Path("p.yaml")).command
+    assert command.index("--params-file") + 1 == command.index("p.yaml") < command.index("-p")
+
+
+def test_simulated_time_is_passed_to_every_node_when_asked_for():
+    assert all(p.parameters["use_sim_time"] is True for p in expand(SITE, PEOPLE, FOLDER, use_sim_time=True))
+    assert not any("use_sim_time" in p.parameters for p in expand(SITE, PEOPLE, FOLDER))
+
+
+def test_nodes_are_picked_by_kind_or_by_full_name():
+    picked = expand(SITE, PEOPLE, FOLDER, only=["dwm1000_driver", "driver/n100_driver"])
+    assert [p.name for p in picked] == ["dwm1000_driver_portal", "dwm1000_driver_junction", "driver/n100_driver"]
+
+
+def test_a_kind_without_anyone_to_serve_is_still_a_kind():
+    assert expand(SITE, People(()), FOLDER, only=["n100_driver"]) == []
+
+
+def test_an_unknown_node_is_refused_with_those_there_are():
+    with pytest.raises(
+        ConfigurationError, match=r"--only: n200: no such node here; allowed: dwm1000_driver, .*fitter/n100"
+    ):
+        expand(SITE, PEOPLE, FOLDER, only=["n200"])
+
+
+def test_every_package_of_the_graph_is_one_of_ours():
+    assert all((ROOT / "src" / spec.package / "package.xml").is_file() for spec in read_graph())
+
+
+@pytest.mark.parametrize(
+    ("discovery", "range_", "peers"),
+    [
+        (Discovery(), "LOCALHOST", ""),
+        (Discovery("subnet", ("10.0.0.2", "gate.mine")), "SUBNET", "10.0.0.2;gate.mine"),
+        (Discovery("off"), "OFF", ""),
+    ],
+)
+def test_discovery_is_what_the_site_says(discovery, range_, peers):
+    expected = {"ROS_AUTOMATIC_DISCOVERY_RANGE": range_, "ROS_STATIC_PEERS": peers}
+    assert discovery_environment(discovery) == expected
+
+
+@pytest.mark.parametrize("spec", read_graph(), ids=lambda spec: spec.key)
+def test_a_node_takes_every_parameter_that_the_graph_gives_it(spec):
+    module, _, name = spec.parameter_class.partition(":")
+    taken = constraints(getattr(pytest.importorskip(module), name))
+    assert set(spec.parameters) | {"site"} <= set(taken)
