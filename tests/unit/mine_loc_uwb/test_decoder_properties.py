@@ -38,6 +38,12 @@ FRAMES = {
         b"T:144235622:RR:0:2:950:950:118:1910\r\n",
         b"Distance : 2.345678\r\n",
     ],
+    "nlink": [
+        bytes.fromhex(
+            "55 05 24 00 02 03 40 e2 01 00 f1 fb 09 00 00 00 00 00 92 13 0201 00 70 0d 00 a3 9e 01 01 17 2f 00 be a9 b0"
+        ),
+        bytes.fromhex("55 05 16 00 02 03 40 e2 01 00 f1 fb 09 00 00 00 00 00 92 13 00 32"),
+    ],
     "mine_loc": [
         encode_frame(
             FrameType.RANGES, 0, encode_ranges(RangingRound(1, 2, 3, 4, (Range(5, 6.0),) * 2, corrected=False))
@@ -46,7 +52,7 @@ FRAMES = {
         encode_frame(FrameType.CIR, 2, encode_cir(CIR)),
     ],
 }
-FLUSH = {"mine_loc": bytes(4200), "dwm1001_tlv": bytes(300)}
+FLUSH = {"mine_loc": bytes(4200), "dwm1001_tlv": bytes(300), "nlink": bytes(500)}
 """What completes any frame that damage pretends to begin; a line end does so in text."""
 
 every_format = pytest.mark.parametrize("name", FORMATS)

@@ -15,6 +15,9 @@ SAMPLES = {
         "2e 02 70 0d 00 00 64 04 1f 00 00 5e 1f 00 00 00 00 00 00 64"
     ),
     "arduino": b"from: 1782\t Range: 1.23 m\t RX power: -78.45 dBm\r\n",
+    "nlink": bytes.fromhex(
+        "55 05 24 00 02 03 40 e2 01 00 f1 fb 09 00 00 00 00 00 92 13 02 01 00 70 0d 00 a3 9e 01 01 17 2f 00 be a9 b0"
+    ),
     "mine_loc": encode_frame(
         FrameType.RANGES, 0, encode_ranges(RangingRound(1, 1, 1, 1, (Range(2, 3.0),), corrected=False))
     ),
@@ -26,8 +29,8 @@ def test_there_is_a_sample_of_every_format():
 
 
 def test_an_unknown_name_is_refused_with_the_allowed_ones():
-    with pytest.raises(ConfigurationError, match=r"'nlink' is unknown; allowed: trek1000, .*, mine_loc"):
-        make_decoder("nlink")
+    with pytest.raises(ConfigurationError, match=r"'lora' is unknown; allowed: trek1000, .*, mine_loc"):
+        make_decoder("lora")
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -9,12 +9,14 @@ from mine_loc_uwb.wire import arduino, dwm1001_shell, trek1000
 from mine_loc_uwb.wire.decoder import Decoder
 from mine_loc_uwb.wire.dwm1001_tlv import TlvDecoder
 from mine_loc_uwb.wire.mine_loc_frame import MineLocDecoder
+from mine_loc_uwb.wire.nlink import NlinkDecoder
 
 _MAKERS: dict[str, Callable[[], Decoder]] = {
     "trek1000": trek1000.decoder,
     "dwm1001_shell": dwm1001_shell.decoder,
     "dwm1001_tlv": TlvDecoder,
     "arduino": arduino.decoder,
+    "nlink": NlinkDecoder,
     "mine_loc": MineLocDecoder,
 }
 
