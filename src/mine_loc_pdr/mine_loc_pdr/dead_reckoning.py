@@ -49,6 +49,8 @@ class StepEvent:
     length_variance_m2: float  # holds that it may be none at all
     heading_rad: float
     heading_variance_rad2: float
+    x_m: float  # position after the step, in odom
+    y_m: float
     confidence: float  # probability that this was a step
 
 
@@ -70,8 +72,10 @@ class PedestrianDeadReckoning:
     no_gravity puts the start off; gaps and clock_jumps are carried over with the covariance grown accordingly.
     """
 
-    def __init__(self, stride: StrideModel) -> None:
+    def __init__(self, stride: StrideModel, forward_imu: Vector3 = (1.0, 0.0, 0.0)) -> None:
+        """`forward_imu`: the unit vector in the IMU's axes that points to the front of the body."""
         self._stride = stride
+        self._forward_imu = forward_imu
         self._detector = StepDetector()
         self._rest = RestDetector()
         self._drift = DriftModel(stride.scale_variance)
@@ -128,7 +132,8 @@ class PedestrianDeadReckoning:
         if math.hypot(fx, fy, fz) < 0.5 * STANDARD_GRAVITY_M_S2:
             self.faults["no_gravity"] += 1
             return
-        self._attitude, self._last = AttitudeFilter((float(fx), float(fy), float(fz))), sample
+        self._attitude = AttitudeFilter((float(fx), float(fy), float(fz)), self._forward_imu)
+        self._last = sample
         self._drift_ns = sample.stamp_ns
 
     def _irregular(self, sample: ImuSample, dt_ns: int) -> None:
@@ -187,6 +192,8 @@ class PedestrianDeadReckoning:
             self._stride.common_variance_m2(length_m) + own_variance_m2,
             heading_rad,
             float(self._drift.covariance[HEADING, HEADING]) + DIRECTION_SD_RAD**2,
+            self._x_m,
+            self._y_m,
             step.confidence,
         )
 

@@ -53,6 +53,13 @@ def test_counter_clockwise_is_positive():
     assert_allclose(attitude.facing, (math.cos(1.0), math.sin(1.0)), atol=1e-6)
 
 
+def test_facing_is_where_the_stated_front_of_the_body_points():
+    attitude = AttitudeFilter((0.0, 9.81, 0.1), forward_imu=(0.0, 0.0, 1.0))
+    assert attitude.heading_rad == pytest.approx(0.0, abs=1e-9)
+    front = quaternion.rotate(attitude.orientation_imu, (0.0, 0.0, 1.0))
+    assert front[0] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_an_upside_down_start_is_still_upright():
     attitude = AttitudeFilter((0.0, 0.0, -9.81))
     assert_allclose(attitude.up_imu, (0.0, 0.0, -1.0), atol=1e-12)

@@ -52,6 +52,7 @@ def test_a_straight_walk_goes_as_far_as_its_steps_are_long():
     assert len(steps) == pdr.step_count == 36
     assert [s.count for s in steps] == list(range(1, 37))
     assert pose.x_m == pytest.approx(sum(s.length_m for s in steps))
+    assert (steps[-1].x_m, steps[-1].y_m) == (pose.x_m, pose.y_m)
     assert pose.x_m == pytest.approx(36 * 0.702, rel=0.01)
     assert pose.y_m == pytest.approx(0.0, abs=1e-6)
 
