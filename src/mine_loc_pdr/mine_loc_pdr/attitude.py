@@ -1,0 +1,122 @@
+"""Attitude of a worn IMU: gyro integration by quaternion, held upright by gravity (paper B, equations 4 to 6).
+
+Scalars instead of arrays: this runs for every sample of every person, and on four numbers numpy is several times
+slower.
+"""
+
+import math
+from typing import TypeAlias
+
+Vector3: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+# Slow enough that the accelerations of a stride, which average to nothing, stay out; fast enough to hold the tilt
+# against the drift of a gyro with 0.5 °/s of bias within 3°.
+GRAVITY_TIME_CONSTANT_S = 5.0
+_SMALLEST_FORWARD = 0.3  # horizontal part of a unit vector
+_LARGEST_FORCE_M_S2 = 3.0 * STANDARD_GRAVITY_M_S2  # a knock against the device must not tip the horizon
+
+
+class AttitudeFilter:
+    """Attitude of the IMU in an odom frame: z up, and x where the person faced at the start.
+
+    The tilt the IMU has at the start is taken for its mounting, so a belt that sits askew does no harm: base_link is
+    the body levelled, its x axis the horizontal part of `forward_imu`. Where that points up or down, because the
+    stated mounting is wrong, facing is off by a constant, which the alignment of odom with the map takes up.
+
+    Vectors are in the IMU's axes, forward-left-up by convention.
+    """
+
+    def __init__(self, force_m_s2: Vector3, forward_imu: Vector3 = (1.0, 0.0, 0.0)) -> None:
+        """Start upright by gravity, from a specific force averaged over a moment; raises ValueError if it is zero."""
+        self._q = _levelling(force_m_s2)
+        self._forward_imu = forward_imu
+        east, north = self.facing
+        if math.hypot(east, north) > _SMALLEST_FORWARD:
+            self._q = _turned_about_up(self._q, -math.atan2(north, east))
+        self._forward_imu = _row_x(self._q)
+        self.bias_rad_s: Vector3 = (0.0, 0.0, 0.0)
+
+    def update(self, dt_s: float, rate_rad_s: Vector3, force_m_s2: Vector3) -> None:
+        """Advance by dt_s with the mean angular rate over it and the specific force at its end."""
+        fx, fy, fz = force_m_s2
+        ux, uy, uz = self.up_imu
+        gain = 1.0 / (GRAVITY_TIME_CONSTANT_S * STANDARD_GRAVITY_M_S2)
+        magnitude = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if magnitude > _LARGEST_FORCE_M_S2:
+            gain *= _LARGEST_FORCE_M_S2 / magnitude
+        bx, by, bz = self.bias_rad_s
+        self._q = turned(
+            self._q,
+            (rate_rad_s[0] - bx + gain * (fy * uz - fz * uy)) * dt_s,
+            (rate_rad_s[1] - by + gain * (fz * ux - fx * uz)) * dt_s,
+            (rate_rad_s[2] - bz + gain * (fx * uy - fy * ux)) * dt_s,
+        )
+
+    @property
+    def orientation_imu(self) -> Quaternion:
+        """odom←imu, unit, w x y z."""
+        return self._q
+
+    @property
+    def up_imu(self) -> Vector3:
+        """Unit vector up, in the IMU's axes."""
+        w, x, y, z = self._q
+        return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+    @property
+    def facing(self) -> tuple[float, float]:
+        """Where base_link's x axis points, as east-like and north-like components in odom."""
+        w, x, y, z = self._q
+        fx, fy, fz = self._forward_imu
+        return (
+            (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy + 2.0 * (x * z + w * y) * fz,
+            2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy + 2.0 * (y * z - w * x) * fz,
+        )
+
+    @property
+    def heading_rad(self) -> float:
+        """Yaw of base_link in odom, -π..π, counter-clockwise."""
+        x, y = self.facing
+        return math.atan2(y, x)
+
+
+def turned(q: Quaternion, vx: float, vy: float, vz: float) -> Quaternion:
+    """`q` turned by a rotation vector (rad) in the body's axes: paper B equation 4, exact for a constant rate."""
+    angle = math.sqrt(vx * vx + vy * vy + vz * vz)
+    s = math.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+    c, vx, vy, vz = math.cos(0.5 * angle), s * vx, s * vy, s * vz
+    w, x, y, z = q
+    w, x, y, z = (
+        w * c - x * vx - y * vy - z * vz,
+        w * vx + x * c + y * vz - z * vy,
+        w * vy - x * vz + y * c + z * vx,
+        w * vz + x * vy - y * vx + z * c,
+    )
+    n = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    return w * n, x * n, y * n, z * n
+
+
+def _levelling(force: Vector3) -> Quaternion:
+    """The shortest rotation that turns `force` upwards."""
+    magnitude = math.sqrt(sum(f * f for f in force))
+    if not magnitude > 0.0:
+        raise ValueError(f"specific force {force}: gravity cannot be told from it")
+    x, y, z = (f / magnitude for f in force)
+    if z < -1.0 + 1e-9:
+        return 0.0, 1.0, 0.0, 0.0  # upside down: roll over
+    n = math.sqrt(2.0 * (1.0 + z))
+    return 0.5 * n, y / n, -x / n, 0.0
+
+
+def _turned_about_up(q: Quaternion, angle_rad: float) -> Quaternion:
+    c, s = math.cos(0.5 * angle_rad), math.sin(0.5 * angle_rad)
+    w, x, y, z = q
+    return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+
+
+def _row_x(q: Quaternion) -> Vector3:
+    """The odom x axis in the IMU's axes."""
+    w, x, y, z = q
+    return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)

@@ -1,0 +1,167 @@
+"""Node: one N100 on a serial line or TCP bridge to sensor_msgs (REP 145); runs in the namespace of its person."""
+
+import time
+from collections.abc import Iterable
+
+from sensor_msgs.msg import FluidPressure, Imu, MagneticField
+from std_msgs.msg import Header
+
+from mine_loc_core.device_clock import DeviceClock
+from mine_loc_core.errors import ConfigurationError
+from mine_loc_core.health import Health, Level
+from mine_loc_core.nodes.conversions import to_time
+from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.serial_link import SerialLink
+from mine_loc_core.stamps import to_ns
+from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
+from mine_loc_pdr.parameters import N100DriverParameters
+
+_TICK_S = 1e-6
+_COUNTER_BITS = 64
+_SILENT_S = 1.0
+# A timer in the events executor costs a third of waking the other one for every few bytes; stamps are the device's.
+_DRAIN_PERIOD_S = 0.005
+_ABSENT = [-1.0] + 8 * [0.0]  # sensor_msgs/Imu: this quantity is not there
+
+
+class N100Driver(NodeBase):
+    """Publishes imu/data, imu/mag and, where a barometer is fitted, imu/pressure."""
+
+    parameter_class = N100DriverParameters
+
+    def __init__(self) -> None:
+        super().__init__("n100_driver")
+
+    def configure(self) -> None:
+        """Create the publishers; the line is opened when the node becomes active."""
+        for name in ("person", "port"):
+            if not getattr(self.parameters, name):
+                raise ConfigurationError(f"{self.get_name()}: {name}: empty; allowed: any but an empty text")
+        self._frame_id = f"{self.parameters.person}/imu_link"
+        self._imu = self.publish_to(Imu, "imu/data", EVENTS)
+        self._mag = self.publish_to(MagneticField, "imu/mag", EVENTS)
+        self._pressure = self.publish_to(FluidPressure, "imu/pressure", EVENTS)
+        self.every(_DRAIN_PERIOD_S, self._drain)
+        self.parameters_changed()
+
+    def activate(self) -> None:
+        """Open the line, and keep opening it."""
+        self._stream = N100Stream(self._new_clock())
+        self._published = self._reported = self._lost = 0
+        self._reported_at_s = time.monotonic()
+        self._link = SerialLink(self.parameters.port, self.parameters.baud, clock=self.now_ns, wake=_no_wake)
+        self._link.start()
+
+    def deactivate(self) -> None:
+        """Close the line."""
+        self._link.stop()
+
+    def parameters_changed(self) -> None:
+        """Work out the covariances."""
+        p = self.parameters
+        self._force_covariance = _isotropic(p.linear_acceleration_stddev)
+        self._rate_covariance = _isotropic(p.angular_velocity_stddev)
+        self._orientation_covariance = _isotropic(p.orientation_stddev)
+        self._field_covariance = _isotropic(p.magnetic_field_stddev)
+
+    def clock_jumped(self, delta_ns: int) -> None:
+        """Map device time anew."""
+        del delta_ns
+        self._stream.restart_clock(self._new_clock())
+
+    def health(self) -> Iterable[Health]:
+        """The line, what comes over it, and the clock."""
+        return (self._line_health(), self._sample_health(), self._clock_health())
+
+    def _new_clock(self) -> DeviceClock:
+        p = self.parameters
+        return DeviceClock(_TICK_S, _COUNTER_BITS, latency_ns=to_ns(p.latency), bypass=p.stamp_on_arrival)
+
+    def _drain(self) -> None:
+        for chunk in self._link.take():
+            if not chunk.data:
+                self._stream.reconnected()
+            for measurement in self._stream.feed(chunk.arrival_ns, chunk.data):
+                self._publish(measurement)
+
+    def _publish(self, measurement: ImuMeasurement) -> None:
+        header = Header(stamp=to_time(measurement.stamp_ns), frame_id=self._frame_id)
+        imu = Imu(header=header)
+        imu.angular_velocity.x, imu.angular_velocity.y, imu.angular_velocity.z = measurement.rate_rad_s
+        imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z = measurement.force_m_s2
+        imu.angular_velocity_covariance = self._rate_covariance
+        imu.linear_acceleration_covariance = self._force_covariance
+        if measurement.orientation is None:
+            imu.orientation_covariance = _ABSENT
+        else:
+            q = imu.orientation
+            q.w, q.x, q.y, q.z = measurement.orientation
+            imu.orientation_covariance = self._orientation_covariance
+        self._imu.publish(imu)
+        if self._mag.get_subscription_count():  # publishing costs as much as all the rest, heard or not
+            self._publish_field(header, measurement)
+        if measurement.pressure_pa is not None:
+            self._pressure.publish(FluidPressure(header=header, fluid_pressure=measurement.pressure_pa))
+        self._published += 1
+
+    def _publish_field(self, header: Header, measurement: ImuMeasurement) -> None:
+        mag = MagneticField(header=header, magnetic_field_covariance=self._field_covariance)
+        mag.magnetic_field.x, mag.magnetic_field.y, mag.magnetic_field.z = measurement.field_t
+        self._mag.publish(mag)
+
+    def _line_health(self) -> Health:
+        status = self._link.status
+        values = {
+            "port": status.port or self.parameters.port,
+            "connections": status.connections,
+            "bytes_read": status.bytes_read,
+            "bytes_dropped": status.bytes_dropped,
+        }
+        if not status.port:
+            level, message = Level.ERROR, f"down: {status.error}"
+        elif status.silent_s > _SILENT_S:
+            level, message = Level.ERROR, f"silent for {status.silent_s:.1f} s"
+        else:
+            level, message = Level.OK, "connected"
+        return Health("serial line", level, message, values, hardware_id=self.parameters.port)
+
+    def _sample_health(self) -> Health:
+        now_s = time.monotonic()
+        rate_hz = (self._published - self._reported) / max(now_s - self._reported_at_s, 1e-3)
+        decoder = self._stream.decoder
+        damage = {name: n for name, n in (decoder.losses + self._stream.faults).items() if name != "skipped_bytes"}
+        lost_now = sum(damage.values()) - self._lost
+        self._reported, self._reported_at_s, self._lost = self._published, now_s, sum(damage.values())
+        skipped = {f"skipped_type_{kind:#04x}": n for kind, n in decoder.skipped_types.items()}
+        values = {
+            "rate_hz": f"{rate_hz:.1f}",
+            "samples": self._published,
+            "skipped_bytes": decoder.losses["skipped_bytes"],
+        }
+        values |= damage | skipped
+        if not rate_hz:
+            return Health("samples", Level.ERROR, "no samples", values, hardware_id=self.parameters.port)
+        level = Level.WARN if lost_now else Level.OK
+        return Health("samples", level, f"{rate_hz:.0f} Hz, {lost_now} lost or damaged", values, self.parameters.port)
+
+    def _clock_health(self) -> Health:
+        stamp = self._stream.last_stamp
+        if stamp is None:
+            return Health("device clock", Level.OK, "no device time yet")
+        values = {"offset_ns": stamp.offset_ns, "skew_ppm": f"{stamp.skew_ppm:.1f}", "state": stamp.state.name}
+        return Health("device clock", Level.OK, stamp.state.name.lower(), values, self.parameters.port)
+
+
+def _no_wake() -> None:
+    """The queue is looked into by a timer."""
+
+
+def _isotropic(stddev: float) -> list[float]:
+    """Row-major 3×3; all zero where the deviation is unknown (REP 145)."""
+    variance = stddev * stddev
+    return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
+
+
+if __name__ == "__main__":
+    raise SystemExit(run(N100Driver))

@@ -1,0 +1,191 @@
+"""Node: steps and odometry of all people who wear an N100."""
+
+import math
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from geometry_msgs.msg import TransformStamped
+from mine_loc_interfaces.msg import Step
+from mine_loc_interfaces.srv import Reset
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from mine_loc_core import quaternion
+from mine_loc_core.health import Health, Level
+from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.qos import EVENTS, STREAM
+from mine_loc_core.people import N100, PeopleFile, Person
+from mine_loc_core.stamps import NS_PER_S
+from mine_loc_pdr.dead_reckoning import ImuSample, OdometryPose, PedestrianDeadReckoning, StepEvent
+from mine_loc_pdr.parameters import PdrParameters
+from mine_loc_pdr.stride import StrideModel
+
+_PEOPLE_PERIOD_S = 1.0
+_SILENT_S = 1.0
+_FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says nothing about them
+
+
+class Track:
+    """One person's dead reckoning and the ends of its topics."""
+
+    def __init__(self, person: Person, n100: N100) -> None:
+        self.person = person
+        self._n100 = n100
+        self.subscription: Any = None
+        self.odometry: Any = None
+        self.heard_s = time.monotonic()
+        self.faults_reported = 0
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin at the origin of odom."""
+        stride = self.person.stride
+        model = StrideModel(self.person.height_m, stride.alpha, stride.beta, stride.k)
+        mounting = quaternion.from_euler_zyx(*self._n100.mounting_rpy_rad)
+        x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
+        self.pdr = PedestrianDeadReckoning(model, (float(x), float(y), float(z)))
+        self.published_period = 0
+        self.samples = 0
+
+
+class Pdr(NodeBase):
+    """Publishes pdr/steps, and for each person <person>/odometry and the transform of base_link in odom."""
+
+    parameter_class = PdrParameters
+
+    def __init__(self) -> None:
+        super().__init__("pdr")
+
+    def configure(self) -> None:
+        """Read the people and listen to each who wears an N100."""
+        self._tracks: dict[str, Track] = {}
+        self._file = PeopleFile(Path(self.parameters.site))
+        self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
+        self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
+        self._follow(self._file.people)
+        self.parameters_changed()
+        self.every(_PEOPLE_PERIOD_S, self._poll_people)
+        self.serve(Reset, "~/reset", self._reset)
+
+    def parameters_changed(self) -> None:
+        """Work out the period of the odometry."""
+        self._period_ns = round(NS_PER_S / self.parameters.odometry_rate)
+
+    def health(self) -> Iterable[Health]:
+        """Each person's track, and the people file."""
+        yield from (self._track_health(track) for track in self._tracks.values())
+        if self._file.error:
+            yield Health("people file", Level.WARN, self._file.error)
+
+    def _poll_people(self) -> None:
+        people = self._file.poll()
+        if people is not None:
+            self._follow(people)
+
+    def _follow(self, people: Iterable[Person]) -> None:
+        """Listen to these people; a track whose person did not change goes on."""
+        wearers = {person.name: person for person in people if person.n100}
+        for name, track in list(self._tracks.items()):
+            if wearers.get(name) != track.person:
+                self.destroy_subscription(track.subscription)
+                self.destroy_publisher(track.odometry)
+                del self._tracks[name]
+        for name, person in wearers.items():
+            if name not in self._tracks and person.n100:
+                self._tracks[name] = self._new_track(person, person.n100)
+
+    def _new_track(self, person: Person, n100: N100) -> Track:
+        track = Track(person, n100)
+        track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
+        if self.active:
+            track.odometry.on_activate(None)  # publishers made now missed the transition
+        track.subscription = self.subscribe(
+            Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM
+        )
+        return track
+
+    def _on_imu(self, track: Track, message: Imu) -> None:
+        rate, force = message.angular_velocity, message.linear_acceleration
+        stamp_ns = to_stamp_ns(message.header.stamp)
+        step = track.pdr.push(ImuSample(stamp_ns, (rate.x, rate.y, rate.z), (force.x, force.y, force.z)))
+        track.samples += 1
+        track.heard_s = time.monotonic()
+        if step is not None:
+            self._steps.publish(_step(track.person.name, step))
+        period = stamp_ns // self._period_ns
+        if period != track.published_period and (pose := track.pdr.pose()) is not None:
+            track.published_period = period
+            self._publish_pose(track, pose)
+
+    def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
+        name = track.person.name
+        odometry = Odometry(child_frame_id=f"{name}/base_link")
+        odometry.header = Header(stamp=to_time(pose.stamp_ns), frame_id=f"{name}/odom")
+        body = odometry.pose.pose
+        body.position.x, body.position.y = pose.x_m, pose.y_m
+        body.orientation.w, body.orientation.z = math.cos(0.5 * pose.yaw_rad), math.sin(0.5 * pose.yaw_rad)
+        odometry.pose.covariance = _covariance(pose)
+        odometry.twist.covariance[::7] = _FLAT_VARIANCE
+        track.odometry.publish(odometry)
+        transform = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
+        transform.transform.translation.x, transform.transform.translation.y = pose.x_m, pose.y_m
+        transform.transform.rotation = body.orientation
+        self._tf.publish(TFMessage(transforms=[transform]))
+
+    def _reset(self, request: Any) -> tuple[bool, str]:
+        if request.person and request.person not in self._tracks:
+            return False, f"{request.person}: wears no N100; known: {', '.join(self._tracks) or 'nobody'}"
+        chosen = [request.person] if request.person else list(self._tracks)
+        for name in chosen:
+            self._tracks[name].restart()
+        return True, f"restarted: {', '.join(chosen) or 'nobody'}"
+
+    def _track_health(self, track: Track) -> Health:
+        name, pdr, silent_s = track.person.name, track.pdr, time.monotonic() - track.heard_s
+        faults = sum(pdr.faults.values())
+        new_faults, track.faults_reported = faults - track.faults_reported, faults
+        values = {"samples": track.samples, "steps": pdr.step_count, **pdr.faults}
+        pose = pdr.pose()
+        if pose is not None:
+            values["heading_sd_deg"] = f"{math.degrees(math.sqrt(pose.covariance[2, 2])):.1f}"
+            values["gyro_bias_sd_deg_s"] = f"{math.degrees(pdr.bias_sd_rad_s):.3f}"
+        if silent_s > _SILENT_S:
+            return Health(name, Level.ERROR, f"no samples for {silent_s:.1f} s", values)
+        if new_faults:
+            return Health(name, Level.WARN, f"{new_faults} unusable samples or gaps in the last second", values)
+        return Health(name, Level.OK, "tracking" if pose is not None else "finding the horizon", values)
+
+
+def _step(person: str, step: StepEvent) -> Step:
+    return Step(
+        header=Header(stamp=to_time(step.stamp_ns), frame_id=f"{person}/odom"),
+        person=person,
+        count=step.count,
+        interval=math.nan if step.interval_s is None else step.interval_s,
+        length=step.length_m,
+        length_variance=step.length_variance_m2,
+        heading=step.heading_rad,
+        heading_variance=step.heading_variance_rad2,
+        position=to_point((step.x_m, step.y_m, 0.0)),
+        confidence=step.confidence,
+    )
+
+
+def _covariance(pose: OdometryPose) -> list[float]:
+    """Row-major 6×6 of x, y, z, roll, pitch, yaw."""
+    p = pose.covariance.tolist()
+    full = [0.0] * 36
+    full[0], full[1], full[5] = p[0]
+    full[6], full[7], full[11] = p[1]
+    full[30], full[31], full[35] = p[2]
+    full[14] = full[21] = full[28] = _FLAT_VARIANCE
+    return full
+
+
+if __name__ == "__main__":
+    raise SystemExit(run(Pdr))

@@ -1,0 +1,113 @@
+"""Step detection: one step a peak and valley, none while standing, soon after the heel strike."""
+
+import itertools
+import math
+import statistics
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMedian, Step, StepDetector
+
+
+def detect(values, rate_hz=100, detector=None, start_ns=10**18):
+    """(stamp of the sample, step) of each step in `values` sampled at rate_hz."""
+    detector = detector or StepDetector()
+    stamps = [start_ns + k * NS_PER_S // rate_hz for k in range(len(values))]
+    return [(t, s) for t, v in zip(stamps, values, strict=True) if (s := detector.push(t, float(v)))]
+
+
+def walk(seconds, step_hz=1.8, rate_hz=100, amplitude=2.5):
+    t = np.arange(round(seconds * rate_hz)) / rate_hz
+    return amplitude * np.sin(2 * np.pi * step_hz * t)
+
+
+@pytest.mark.parametrize("rate_hz", [50, 82, 100, 200, 400])
+@pytest.mark.parametrize("step_hz", [1.0, 1.8, 2.8])
+def test_every_cycle_is_one_step_at_any_sample_rate(step_hz, rate_hz):
+    steps = detect(walk(20, step_hz, rate_hz), rate_hz)
+    assert len(steps) == round(20 * step_hz)
+    assert all(s.interval_s == pytest.approx(1 / step_hz, abs=0.03) for _, s in steps[3:])
+
+
+def test_a_step_is_stamped_at_its_peak_and_reported_within_four_tenths_of_a_second():
+    steps = detect(walk(20, 1.8))
+    for reported_ns, step in steps:
+        phase = ((step.stamp_ns - 10**18) / NS_PER_S * 1.8) % 1.0
+        assert phase == pytest.approx(0.25, abs=0.05)
+        assert reported_ns - step.stamp_ns < 400 * NS_PER_MS
+
+
+def test_standing_still_is_no_step():
+    noise = np.random.default_rng(0).normal(0.0, 0.05, 60_000)
+    assert detect(noise) == []
+
+
+def test_swaying_and_shifting_the_weight_is_no_step():
+    assert detect(walk(60, 0.5, amplitude=0.35)) == []
+    assert detect(walk(60, 1.5, amplitude=0.8)) == []
+
+
+def test_in_a_walk_weaker_peaks_count_than_at_its_start():
+    steps = detect(np.concatenate((walk(4, 2.0), walk(4, 2.0, amplitude=0.7))))
+    assert len(steps) == 16
+
+
+def test_two_zero_crossings_between_peak_and_valley_are_no_step():
+    up, valley = np.full(20, 2.0), np.full(20, -2.0)
+    wiggle = np.concatenate((np.full(12, -0.1), np.full(12, 0.1)))
+    assert len(detect(np.concatenate((up, valley)))) == 1
+    assert detect(np.concatenate((up, wiggle, valley))) == []
+
+
+def test_the_first_step_after_standing_has_no_interval():
+    still = np.zeros(to_ns(3.0) // (10 * NS_PER_MS))
+    steps = [s for _, s in detect(np.concatenate((walk(3), still, walk(3))))]
+    assert [s.interval_s is None for s in steps].count(True) == 2
+    assert steps[0].interval_s is None
+
+
+def test_shaking_faster_than_anyone_walks_is_not_a_step_a_shake():
+    steps = [s for _, s in detect(walk(10, 5.0))]
+    assert all(s.interval_s is None or s.interval_s >= 0.3 for s in steps)
+    assert len(steps) <= 10 / 0.3
+
+
+def test_an_accelerometer_offset_goes_away():
+    assert len(detect(walk(60, 1.8, amplitude=1.2) + 1.0)) == pytest.approx(108, abs=8)
+
+
+def test_reset_forgets_the_walk():
+    detector = StepDetector()
+    detect(walk(3), detector=detector)
+    detector.reset()
+    assert detect(walk(3), detector=detector, start_ns=2 * 10**18)[0][1].interval_s is None
+
+
+def test_confidence_is_a_probability_that_grows_with_the_peak_and_in_a_walk():
+    weak, strong = Step(0, 0.5, 0.5), Step(0, 0.5, 3.0)
+    assert 0.5 < weak.confidence < strong.confidence < 1.0
+    assert Step(0, None, 1.5).confidence < Step(0, 0.5, 1.5).confidence
+
+
+@given(st.lists(st.floats(-50, 50), min_size=1, max_size=200), st.integers(2, 30))
+def test_the_moving_median_is_the_median_of_the_window(values, window):
+    median = MovingMedian(window * 10)
+    for k, value in enumerate(values):
+        middle_ns, result = median.push(k * 10, value)
+        inside = values[max(0, k - window + 1) : k + 1]
+        assert result == statistics.median_high(inside)
+        assert middle_ns == (max(0, k - window + 1) * 10 + k * 10) // 2
+
+
+@given(st.lists(st.floats(-500, 500), max_size=400))
+def test_steps_of_any_signal_are_in_order_and_apart(values):
+    steps = [s for _, s in detect(values)]
+    for earlier, later in itertools.pairwise(steps):
+        apart_ns = later.stamp_ns - earlier.stamp_ns
+        assert apart_ns >= 300 * NS_PER_MS
+        assert (later.interval_s is None) == (apart_ns > LONGEST_INTERVAL_NS)
+        assert math.isfinite(later.confidence)
