@@ -40,7 +40,9 @@ class BagWriter:
 def _definitions(package: str) -> dict[str, object]:
     """All message definitions of a package that this workspace brings, from the text it installs."""
     root = Path(str(import_module(package).__file__))
-    folder = next(parent / "share" / package / "msg" for parent in root.parents if (parent / "share" / package).is_dir())
+    folder = next(
+        parent / "share" / package / "msg" for parent in root.parents if (parent / "share" / package).is_dir()
+    )
     definitions: dict[str, object] = {}
     for file in sorted(folder.glob("*.msg")):
         definitions.update(get_types_from_msg(file.read_text("utf-8"), f"{package}/msg/{file.stem}"))

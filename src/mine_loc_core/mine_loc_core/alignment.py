@@ -53,7 +53,9 @@ def align(times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, 
     step_s = 0.05
     grid = np.arange(-search_s, search_s + step_s, step_s)
     coarse_s = float(grid[np.argmin([fit(offset)[0] for offset in grid])])
-    result = minimize_scalar(lambda offset: fit(offset)[0], bounds=(coarse_s - step_s, coarse_s + step_s), method="bounded")
+    result = minimize_scalar(
+        lambda offset: fit(offset)[0], bounds=(coarse_s - step_s, coarse_s + step_s), method="bounded"
+    )
     offset_s = float(result.x)
     _, yaw, shift = fit(offset_s)
     return Alignment(offset_s, yaw, shift)

@@ -59,9 +59,9 @@ def _imu(number: int, stamp_ns: int, message: object) -> bytes:
     w, a = message.angular_velocity, message.linear_acceleration  # type: ignore[attr-defined]
     return encode(
         ImuFrame(
-            gyro_rad_s=(w.x, -w.y, -w.z),
-            accel_m_s2=(a.x, -a.y, -a.z),
-            mag_mg=(0.0, 0.0, 0.0),
+            angular_velocity_rad_s=(w.x, -w.y, -w.z),
+            specific_force_m_s2=(a.x, -a.y, -a.z),
+            magnetic_field_mg=(0.0, 0.0, 0.0),
             temperature_c=25.0,
             pressure_pa=101325.0,
             pressure_temperature_c=25.0,

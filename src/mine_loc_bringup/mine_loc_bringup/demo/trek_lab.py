@@ -9,6 +9,8 @@ from mine_loc_bringup.demo.recording import Burst, Recording, Truth, data_file
 from mine_loc_uwb.ranging import Range, RangingRound
 from mine_loc_uwb.wire.trek1000 import encode_round
 
+_REPORTER = 1  # anchor A0 is the one on the serial line
+
 
 def load() -> Recording:
     """Ranges of a carried tag to four anchors at 10 Hz, Vicon truth on a clock and in a frame of its own."""
@@ -31,4 +33,4 @@ def _ms_of_day(hhmmssmmm: np.ndarray) -> np.ndarray:
 
 def _round(number: int, ms: int, ranges_mm: np.ndarray) -> RangingRound:
     ranges = [Range(i + 1, mm / 1e3 if mm > 0 else nan) for i, mm in enumerate(ranges_mm)]
-    return RangingRound(1, 0, number % 256, ms, tuple(ranges), corrected=True)
+    return RangingRound(1, _REPORTER, number % 256, ms, tuple(ranges), corrected=True)

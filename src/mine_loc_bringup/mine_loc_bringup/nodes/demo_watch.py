@@ -11,8 +11,6 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from mine_loc_core.nodes.conversions import to_stamp_ns
-from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 from mine_loc_interfaces import msg
 from nav_msgs.msg import Odometry
 from rclpy.experimental import EventsExecutor
@@ -21,6 +19,8 @@ from sensor_msgs.msg import Imu, MagneticField
 from tf2_msgs.msg import TFMessage
 
 from mine_loc_bringup.bag_writer import BagWriter
+from mine_loc_core.nodes.conversions import to_stamp_ns
+from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 
 _RATE_WINDOW_S = 3.0
 

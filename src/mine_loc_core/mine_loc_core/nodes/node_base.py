@@ -14,7 +14,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -28,8 +28,7 @@ from mine_loc_core.parameters import Constraint, constraints, from_mapping
 _WATCH_PERIOD_S = 0.2
 _DIAGNOSTICS_PERIOD_S = 1.0
 _JUMP_NS = 500_000_000
-_SPIN_S = 0.5
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SPIN_S = 0.2
 
 
 class NodeBase(LifecycleNode):
@@ -267,9 +266,10 @@ def run(node_class: Callable[[], NodeBase]) -> int:
 
     Without a lifecycle manager the node configures and activates itself (parameter `autostart`).
     """
-    signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
+    stopping = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopping.set())
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    threading.Thread(target=_shut_down_on_signal, daemon=True).start()
     node = None
     try:
         node = node_class()
@@ -278,13 +278,11 @@ def run(node_class: Callable[[], NodeBase]) -> int:
             return 2
         executor = SingleThreadedExecutor() if node.needs_guard_condition else EventsExecutor()
         executor.add_node(node)
-        while rclpy.ok():  # not spin(): in rclpy 7.1.6 the events executor's burns a core and never returns
+        while not stopping.is_set():  # not spin(): the events executor's burns a core and never returns (rclpy 7.1.6)
             executor.spin_once(timeout_sec=_SPIN_S)
     except ConfigurationError as error:
         print(error, file=sys.stderr)
         return 2
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     finally:
         if node is not None:
             if node.active:
@@ -292,12 +290,6 @@ def run(node_class: Callable[[], NodeBase]) -> int:
             node.active = False
         rclpy.try_shutdown()
     return 0
-
-
-def _shut_down_on_signal() -> None:
-    """The events executor does not wake on a signal; it does when the context shuts down."""
-    signal.sigwait(_STOP_SIGNALS)
-    rclpy.try_shutdown()
 
 
 def _start(node: NodeBase) -> bool:
