@@ -3,6 +3,8 @@
 from importlib import import_module
 from pathlib import Path
 
+from rosbags.interfaces import Connection
+from rosbags.interfaces.typing import Typesdict
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -14,7 +16,7 @@ class BagWriter:
         self._types = get_typestore(Stores.ROS2_JAZZY)
         self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
-        self._connections: dict[str, object] = {}
+        self._connections: dict[str, Connection] = {}
 
     def write(self, topic: str, kind: type, stamp_ns: int, data: bytes) -> None:
         """Write one serialised message of a rclpy message class."""
@@ -23,7 +25,7 @@ class BagWriter:
         if connection is None:
             connection = self._writer.add_connection(name, self._type_name(kind), typestore=self._types)
             self._connections[name] = connection
-        self._writer.write(connection, stamp_ns, data)  # type: ignore[arg-type]
+        self._writer.write(connection, stamp_ns, data)
 
     def close(self) -> None:
         """Finish the bag; nothing can be written afterwards."""
@@ -37,13 +39,13 @@ class BagWriter:
         return name
 
 
-def _definitions(package: str) -> dict[str, object]:
+def _definitions(package: str) -> Typesdict:
     """All message definitions of a package that this workspace brings, from the text it installs."""
     root = Path(str(import_module(package).__file__))
     folder = next(
         parent / "share" / package / "msg" for parent in root.parents if (parent / "share" / package).is_dir()
     )
-    definitions: dict[str, object] = {}
+    definitions: Typesdict = {}
     for file in sorted(folder.glob("*.msg")):
         definitions.update(get_types_from_msg(file.read_text("utf-8"), f"{package}/msg/{file.stem}"))
     return definitions

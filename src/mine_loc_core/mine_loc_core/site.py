@@ -18,7 +18,7 @@ from mine_loc_core.yaml_source import load_yaml, refuse
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 Material = Literal["rock", "steel", "concrete", "wood", "water"]
-WireFormat = Literal["auto", "trek1000", "dwm1001_shell", "dwm1001_tlv", "arduino", "mine_loc"]
+WireFormat = Literal["auto", "trek1000", "dwm1001_shell", "dwm1001_tlv", "arduino", "nlink", "mine_loc"]
 
 
 class ZoneType(IntEnum):
@@ -116,13 +116,17 @@ class Monitor:
 
 @dataclass(frozen=True, slots=True)
 class UwbReceiver:
-    """A serial line that brings ranges; `anchor_id` is set when it is an anchor's."""
+    """A serial line that brings ranges.
+
+    `anchor_id` is set when it is an anchor's, `tag_id` (0 = not) where the wire format does not name the tag.
+    """
 
     name: str
     port: str
     format: WireFormat
     baud: int
     anchor_id: int | None
+    tag_id: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,4 +236,5 @@ def _turn_marker(item: Mapping[str, Any]) -> TurnMarker:
 
 def _uwb_receiver(item: Mapping[str, Any]) -> UwbReceiver:
     anchor = device_id(item["anchor"]) if "anchor" in item else None
-    return UwbReceiver(item["name"], item["port"], item.get("format", "auto"), item.get("baud", 115200), anchor)
+    tag = device_id(item["tag"]) if "tag" in item else 0
+    return UwbReceiver(item["name"], item["port"], item.get("format", "auto"), item.get("baud", 115200), anchor, tag)

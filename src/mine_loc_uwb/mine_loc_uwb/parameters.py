@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from mine_loc_core.parameters import NodeParameters, parameter
-
-WIRE_FORMATS = ("auto", "trek1000", "dwm1001_shell", "dwm1001_tlv", "arduino", "mine_loc")
+from mine_loc_uwb.wire.detect import FORMATS
 
 
 @dataclass(frozen=True)
@@ -14,7 +13,7 @@ class Dwm1000DriverParameters(NodeParameters):
     receiver: str = parameter("", "name of the line in site.yaml", read_only=True)
     port: str = parameter("", "path, glob pattern, socket://host:port or hwgrep://VID:PID", read_only=True)
     baud: int = parameter(115200, "speed of the line", unit="baud", low=1200, high=4_000_000, read_only=True)
-    format: str = parameter("auto", "wire format", choices=WIRE_FORMATS, read_only=True)
+    format: str = parameter("auto", "wire format", choices=("auto", *FORMATS), read_only=True)
     latency_ms: float = parameter(0.0, "constant delay from exchange to arrival", unit="ms", low=0.0, high=1000.0)
     trust_device_clock: bool = parameter(True, "stamp by the device's clock; false stamps on arrival")
     range_sd_m: float = parameter(0.1, "standard deviation given to ranges", unit="m", low=0.001, high=10.0)

@@ -22,6 +22,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console as Terminal
+from rich.live import Live
+from rich.table import Table
 
 from mine_loc_bringup.console import Console
 from mine_loc_bringup.demo import generated, isas_walk, trek_lab
@@ -126,15 +129,12 @@ class _Demo:
         return False
 
     async def _play(self, interrupted: asyncio.Event) -> None:
-        from rich.console import Console as RichConsole  # noqa: PLC0415
-        from rich.live import Live  # noqa: PLC0415
-
         self._started_s, self._started_ns = time.monotonic(), time.time_ns()
         for player in self._players:
             player.start(self._started_s)
         lasts_s = max(bursts[-1][0] for bursts in self._recording.lines.values())
         self._ends_s = min(self._seconds, lasts_s)
-        terminal = RichConsole()
+        terminal = Terminal()
         with Live(self._table(), console=terminal, auto_refresh=False, transient=not terminal.is_terminal) as live:
             while (left_s := self._started_s + self._ends_s - time.monotonic()) > 0 and not interrupted.is_set():
                 await asyncio.sleep(min(left_s, _DRAW_PERIOD_S))
@@ -142,7 +142,7 @@ class _Demo:
                     live.update(self._table(), refresh=True)
         self._ends_s = min(self._ends_s, time.monotonic() - self._started_s)
 
-    def _table(self) -> object:
+    def _table(self) -> Table:
         watched = self._watch.watched
         rows = [
             (

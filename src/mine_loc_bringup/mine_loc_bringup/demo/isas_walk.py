@@ -3,6 +3,8 @@
 Ranges are re-encoded in our binary frame, the IMU (a FLU one) as FDILink 0x40 in the device's FRD axes.
 """
 
+from typing import Any
+
 import numpy as np
 from rosbags.highlevel import AnyReader
 
@@ -25,7 +27,7 @@ def load() -> Recording:
         for connection, _, raw in reader.messages():
             if connection.topic not in {"/rtls_flares", "/waveshare_sense_hat_b", "/vive/transform/tracker_1_ref"}:
                 continue
-            message = reader.deserialize(raw, connection.msgtype)
+            message: Any = reader.deserialize(raw, connection.msgtype)
             stamp_ns = message.header.stamp.sec * NS_PER_S + message.header.stamp.nanosec
             if connection.topic == "/rtls_flares":
                 rounds.append((stamp_ns, _round(len(rounds), message)))
@@ -45,18 +47,18 @@ def _bursts(items: list[tuple[int, bytes]], start_ns: int) -> list[Burst]:
     return [((stamp_ns - start_ns) / NS_PER_S, data) for stamp_ns, data in items]
 
 
-def _round(number: int, message: object) -> bytes:
+def _round(number: int, message: Any) -> bytes:
     ranges = [
         Range(item.id, item.range if item.ra else np.nan, first_path_power_dbm=item.fpp, receive_power_dbm=item.rxp)
-        for item in message.ranges  # type: ignore[attr-defined]
+        for item in message.ranges
     ]
-    ticks_us = message.t * 1000  # type: ignore[attr-defined]
+    ticks_us = message.t * 1000
     ranging = RangingRound(_TAG, _TAG, number, ticks_us, tuple(ranges), corrected=False)
     return encode_frame(FrameType.RANGES, number % 2**16, encode_ranges(ranging))
 
 
-def _imu(number: int, stamp_ns: int, message: object) -> bytes:
-    w, a = message.angular_velocity, message.linear_acceleration  # type: ignore[attr-defined]
+def _imu(number: int, stamp_ns: int, message: Any) -> bytes:
+    w, a = message.angular_velocity, message.linear_acceleration
     return encode(
         ImuFrame(
             angular_velocity_rad_s=(w.x, -w.y, -w.z),

@@ -3,11 +3,14 @@
 from math import nan
 
 import numpy as np
+import numpy.typing as npt
 import scipy.io
 
-from mine_loc_bringup.demo.recording import Burst, Recording, Truth, data_file
+from mine_loc_bringup.demo.recording import Array, Burst, Recording, Truth, data_file
 from mine_loc_uwb.ranging import Range, RangingRound
 from mine_loc_uwb.wire.trek1000 import encode_round
+
+Integers = npt.NDArray[np.int64]
 
 _REPORTER = 1  # anchor A0 is the one on the serial line
 
@@ -26,11 +29,11 @@ def load() -> Recording:
     return Recording("trek1000_bielefeld m1l", "trek_lab", lines, [Truth("walker", times_s, vicon[:, 3:6])])
 
 
-def _ms_of_day(hhmmssmmm: np.ndarray) -> np.ndarray:
+def _ms_of_day(hhmmssmmm: Integers) -> Integers:
     hours, minutes, ms = hhmmssmmm // 10_000_000, hhmmssmmm // 100_000 % 100, hhmmssmmm % 100_000
-    return (hours * 60 + minutes) * 60_000 + ms
+    return np.asarray((hours * 60 + minutes) * 60_000 + ms, dtype=np.int64)
 
 
-def _round(number: int, ms: int, ranges_mm: np.ndarray) -> RangingRound:
+def _round(number: int, ms: int, ranges_mm: Array) -> RangingRound:
     ranges = [Range(i + 1, mm / 1e3 if mm > 0 else nan) for i, mm in enumerate(ranges_mm)]
     return RangingRound(1, _REPORTER, number % 256, ms, tuple(ranges), corrected=True)

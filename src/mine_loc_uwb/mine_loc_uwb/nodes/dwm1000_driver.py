@@ -3,13 +3,17 @@
 import sys
 import time
 from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
 
 from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArray
 
+from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.serial_link import SerialLink
+from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_uwb.device_stamps import DeviceStamps
 from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array, to_tdoa_array
@@ -31,7 +35,8 @@ class Dwm1000Driver(NodeBase):
         super().__init__("dwm1000_driver")
 
     def configure(self) -> None:
-        """Create publishers and decoder; nothing is opened yet."""
+        """Create publishers; nothing is opened yet. A receiver that site.yaml does not know refuses the transition."""
+        self._tag_id, self._reporter_id = self._ids_of_line()
         self._ranges = self.publish_to(UwbRangeArray, "uwb/ranges", EVENTS)
         self._tdoa = self.publish_to(TdoaArray, "uwb/tdoa", EVENTS)
         self._cir = self.publish_to(CirFrame, "uwb/cir", EVENTS)
@@ -107,6 +112,7 @@ class Dwm1000Driver(NodeBase):
         if self._decoder.name != self._announced:
             self._announce()
         if isinstance(message, RangingRound):
+            message = self._named(message)
             key = (message.reporter_id, message.tag_id)
             stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
             seq = self._stamps.number(key, self._decoder, message.seq)
@@ -121,6 +127,25 @@ class Dwm1000Driver(NodeBase):
             key = (message.anchor_id, message.tag_id)
             stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
             self._cir.publish(to_cir_frame(message, stamp, _FRAME))
+
+    def _named(self, message: RangingRound) -> RangingRound:
+        """With the ids of the line where the wire format has none."""
+        if message.tag_id and message.reporter_id:
+            return message
+        return replace(
+            message, tag_id=message.tag_id or self._tag_id, reporter_id=message.reporter_id or self._reporter_id
+        )
+
+    def _ids_of_line(self) -> tuple[int, int]:
+        """(tag, reporter) that site.yaml gives to this line, 0 = none."""
+        p = self.parameters
+        if not (p.site and p.receiver):
+            return 0, 0
+        receivers = {receiver.name: receiver for receiver in load_site(Path(p.site)).uwb_receivers}
+        if p.receiver not in receivers:
+            raise ConfigurationError(f"receiver: {p.receiver!r} is not in site.yaml; allowed: {', '.join(receivers)}")
+        receiver = receivers[p.receiver]
+        return receiver.tag_id, receiver.anchor_id or 0
 
     def _announce(self) -> None:
         self._announced = self._decoder.name
