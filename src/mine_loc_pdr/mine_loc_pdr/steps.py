@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_s
 
-# The window and thresholds are those of least error on people 1 to 7 of ipol_gait_lowerback; the others are for
-# scoring (docs/pdr.md).
+# The window and thresholds are those of least error on people 1 to 7 of ipol_gait_lowerback; people 8 to 13 are kept
+# for scoring (test_dead_reckoning.py).
 MEDIAN_WINDOW_NS = 75 * NS_PER_MS
 PEAK_THRESHOLD_M_S2 = 0.4
 VALLEY_THRESHOLD_M_S2 = 0.2

@@ -1,5 +1,6 @@
 """Node: one N100 on a serial line or TCP bridge to sensor_msgs (REP 145); runs in the namespace of its person."""
 
+import sys
 import time
 from collections.abc import Iterable
 
@@ -163,5 +164,10 @@ def _isotropic(stddev: float) -> list[float]:
     return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 
 
+def main() -> int:
+    """Entry point."""
+    return run(N100Driver)
+
+
 if __name__ == "__main__":
-    raise SystemExit(run(N100Driver))
+    sys.exit(main())

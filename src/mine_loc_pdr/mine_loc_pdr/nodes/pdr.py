@@ -1,6 +1,7 @@
 """Node: steps and odometry of all people who wear an N100."""
 
 import math
+import sys
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -187,5 +188,10 @@ def _covariance(pose: OdometryPose) -> list[float]:
     return full
 
 
+def main() -> int:
+    """Entry point."""
+    return run(Pdr)
+
+
 if __name__ == "__main__":
-    raise SystemExit(run(Pdr))
+    sys.exit(main())
