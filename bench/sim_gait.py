@@ -1,0 +1,107 @@
+"""Real lower-back recordings beside simulated walks of the same protocol.
+
+    python bench/sim_gait.py [--json FILE] [--calibration-half]
+
+The even subjects of ipol_gait_lowerback are scored: no constant was fitted to them. `--calibration-half` compares with
+the odd ones instead, on which the constants were measured (for development only). A figure is a subject's mean over
+trials; real p10–p90 over subjects is the band, and the simulated median over people should lie in it.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from gait_measures import measure
+from gait_recordings import RATE_HZ, Walk, level, walks
+from mine_loc_sim.gait import Person, draw_person
+from mine_loc_sim.imu_errors import FLU_TO_FRD, Imu, draw_device
+from mine_loc_sim.magnetic_field import GalleryField
+from mine_loc_sim.route import WayPoint, plan_route
+from mine_loc_sim.walker import Walker
+
+PEOPLE_A_HEIGHT = 8
+TRIALS = 2
+WALKED_M = 10.0
+FIRST_SWING_S = 0.4  # a trial is marked from its first toe-off, which precedes the first heel strike by this
+
+
+def simulate(person: Person, rng: np.random.Generator, subject: int, trial: int) -> Walk:
+    """Stand, walk 10 m, turn, walk back, stop, as a device reports it and as the recordings are read."""
+    there = (WALKED_M, 0.0, 0.0)
+    route = plan_route([WayPoint((0.0, 0.0, 0.0), pause_s=5.0), WayPoint(there), WayPoint((0.0, 0.0, 0.0), pause_s=3.0)],
+                       person.preferred_speed_m_s)
+    walker = Walker(person, route, rng)
+    imu = Imu(draw_device(rng), RATE_HZ, rng)
+    motion = walker.motion(imu.stamps_ns(0, int(walker.duration_s * 1e9)))
+    samples = imu.sample(motion, GalleryField(rng).at(motion.position_m))
+    rate = samples.gyro_rad_s.astype(np.float64) * FLU_TO_FRD
+    marks = {"left": [], "right": []}
+    for step in walker.steps():
+        marks[step.foot].append(round(step.stamp_ns * 1e-9 * RATE_HZ))
+    (turn,) = walker.turns()
+    strikes = sorted(marks["left"] + marks["right"])
+    walk = Walk(
+        subject, trial, person.height_m, samples.accel_m_s2.astype(np.float64) * FLU_TO_FRD,
+        rate - rate[20 : int(4 * RATE_HZ)].mean(axis=0),
+        np.array(marks["left"]), np.array(marks["right"]),
+        strikes[0] - int(FIRST_SWING_S * RATE_HZ), round(turn.start_ns * 1e-9 * RATE_HZ), round(turn.stop_ns * 1e-9 * RATE_HZ), strikes[-1],
+    )
+    return level(walk)
+
+
+def people_figures(source: list[Walk]) -> dict[str, np.ndarray]:
+    """Each figure's mean over trials, one value a person."""
+    trials = defaultdict(list)
+    for walk in source:
+        figures = measure(walk)
+        if figures is not None:
+            trials[walk.subject].append(figures)
+    names = next(iter(trials.values()))[0]
+    return {name: np.array([np.mean([t[name] for t in rows]) for rows in trials.values()]) for name in names}
+
+
+def simulated(real: list[Walk]) -> list[Walk]:
+    """Simulated people of the heights of the recorded ones, drawn from the population."""
+    heights = {walk.subject: walk.height_m for walk in real}
+    result = []
+    for subject, height in heights.items():
+        for i in range(PEOPLE_A_HEIGHT):
+            rng = np.random.default_rng([subject, i])
+            person = draw_person(rng, height_m=height)
+            result += [simulate(person, rng, subject * 100 + i, trial) for trial in range(TRIALS)]
+    return result
+
+
+def main() -> int:
+    """Print the table and write it; exit status 0 whatever the figures say."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--calibration-half", action="store_true", help="compare with the odd subjects")
+    arguments = parser.parse_args()
+    folder = Path(os.environ["MINE_LOC_DATA"]) / "ipol_gait_lowerback" / "GaitData"
+    recorded = list(walks(folder, odd_subjects=arguments.calibration_half))
+    real, sim = people_figures(recorded), people_figures(simulated(recorded))
+    result = {}
+    print(f"{'':32}{'sim':>9}{'p10':>9}{'p90':>9}{'real':>9}{'p10':>9}{'p90':>9}  people {len(sim['steps'])} / {len(real['steps'])}")
+    for name, values in real.items():
+        low, high = np.percentile(values, [10, 90])
+        middle, (sim_low, sim_high) = np.median(sim[name]), np.percentile(sim[name], [10, 90])
+        inside = bool(low <= middle <= high)
+        row = {"sim": middle, "sim_p10": sim_low, "sim_p90": sim_high, "real": np.median(values), "real_p10": low, "real_p90": high}
+        result[name] = {key: round(float(value), 5) for key, value in row.items()} | {"in_band": inside}
+        print(f"{name:32}" + "".join(f"{v:9.3f}" for v in row.values()) + ("" if inside else "  outside"))
+    print(f"{sum(r['in_band'] for r in result.values())} of {len(result)} simulated medians lie in the band of real people")
+    if arguments.json:
+        arguments.json.parent.mkdir(parents=True, exist_ok=True)
+        arguments.json.write_text(json.dumps({"gait": result}, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
