@@ -35,6 +35,8 @@ class Subject:
     harmonics: np.ndarray
     residual_rms: Array  # (6,), strides about their mean
     residual_hz: Array  # (6,), median frequency of its power
+    gain_sd: Array  # (6,), of each stride's projection on the mean stride
+    mean_sd: Array  # (6,), of the strides' means
 
 
 def kinematic_harmonics(wave: Array, stride_s: float) -> np.ndarray:
@@ -50,21 +52,21 @@ def kinematic_harmonics(wave: Array, stride_s: float) -> np.ndarray:
     return np.hstack([acceleration, spectrum[:, 3:]])
 
 
-
-
 def steady_speed(duration_s: float) -> float:
     """Speed v at which a route of a start, a reversal and a stop takes this long: WALKED_M / v + 2 v / a = duration."""
     a = SPEED_CHANGE_M_S2
     return (duration_s - float(np.sqrt(duration_s**2 - 8 * WALKED_M / a))) * a / 4
 
 
-def residual(waves: Array, stride_s: float) -> tuple[Array, Array]:
-    """Rms of strides (n, PHASE_POINTS, 6) about their mean, a channel, and the frequency that halves its power."""
+def residual(waves: Array, stride_s: float) -> tuple[Array, Array, Array, Array]:
+    """Of strides (n, PHASE_POINTS, 6) about their mean: rms, frequency that halves the power, scatter of gain and mean."""
     about = waves - waves.mean(axis=0)
     power = (np.abs(np.fft.rfft(about, axis=1)) ** 2).mean(axis=0)
     share = np.cumsum(power, axis=0) / power.sum(axis=0)
     half = np.array([np.interp(0.5, share[:, c], np.arange(len(share))) for c in range(share.shape[1])])
-    return np.sqrt((about**2).mean(axis=(0, 1))), half / stride_s
+    shape = waves.mean(axis=0) - waves.mean(axis=(0, 1))
+    gain_sd = ((waves * shape).sum(axis=1) / (shape**2).sum(axis=0)).std(axis=0)
+    return np.sqrt((about**2).mean(axis=(0, 1))), half / stride_s, gain_sd, waves.mean(axis=1).std(axis=0)
 
 
 def subject_harmonics(rows: list[Subject]) -> np.ndarray:
@@ -73,12 +75,11 @@ def subject_harmonics(rows: list[Subject]) -> np.ndarray:
     return np.median(series.real, axis=0) + 1j * np.median(series.imag, axis=0)
 
 
-def channel_lines(name: str, series: np.ndarray) -> list[str]:
+def channel_lines(name: str, series: np.ndarray, log_sd: Array) -> list[str]:
     """Constants of one channel, as they stand in gait_constants; `series` is (subjects, HARMONICS)."""
     mirrors = name in MIRRORING
     regular = np.arange(1, HARMONICS + 1) % 2 == int(mirrors)
     amplitude = np.median(np.abs(series), axis=0)
-    amplitude *= np.median(np.linalg.norm(series, axis=1)) / np.linalg.norm(amplitude)  # medians lose energy
     resultant = (series / np.abs(series)).mean(axis=0)
     spread = np.sqrt(-2 * np.log(np.abs(resultant)))
 
@@ -87,6 +88,7 @@ def channel_lines(name: str, series: np.ndarray) -> list[str]:
 
     return [
         f'    Channel("{name}", {mirrors}, {row(amplitude[regular], 3)},',
+        f"            {row(log_sd[regular], 2)},",
         f"            {row(np.angle(resultant[regular]), 2)},",
         f"            {row(spread[regular], 2)},",
         f"            {row(amplitude[~regular], 3)}),",
@@ -102,29 +104,31 @@ def main() -> None:
         if len(durations) >= 4:
             speed = steady_speed((walk.stop - walk.start) / RATE_HZ)
             mean = kinematic_harmonics(waves.mean(axis=0), float(durations.mean()))
-            rms, hz = residual(waves, float(durations.mean()))
-            people[walk.subject].append(Subject(walk.height_m, speed, 2 / float(durations.mean()), mean, rms, hz))
+            rest = residual(waves, float(durations.mean()))
+            people[walk.subject].append(Subject(walk.height_m, speed, 2 / float(durations.mean()), mean, *rest))
     series = np.array([subject_harmonics(rows) for rows in people.values()])
+    energy = np.sqrt((np.abs(series) ** 2).sum(axis=1) / 2)
+    log_sd = (np.log(np.abs(series)) - np.log(energy)[:, None, :]).std(axis=0, ddof=1)
     for c, name in enumerate(CHANNELS):
-        print("\n".join(channel_lines(name, series[:, :, c])))
+        print("\n".join(channel_lines(name, series[:, :, c], log_sd[:, c])))
     speed = np.array([np.median([r.speed_m_s for r in rows]) for rows in people.values()])
     cadence = np.array([np.median([r.step_hz for r in rows]) for rows in people.values()])
     height = np.array([rows[0].height_m for rows in people.values()], dtype=float)
     law = 0.7 + 0.371 * (height - 1.75) + 0.227 * (cadence - 1.79) * height / 1.75
     factor = speed / cadence / law
     slope, mean = np.polyfit(speed - speed.mean(), factor, 1)
-    residual = np.std(factor - mean - slope * (speed - speed.mean()), ddof=2)
+    scatter = np.std(factor - mean - slope * (speed - speed.mean()), ddof=2)
     print(f"speed {speed.mean():.3f} sd {speed.std(ddof=1):.3f} m/s")
-    print(f"K {mean:.3f} + {slope:.3f} s/m (speed - mean), residual sd {residual:.3f}")
-    energy = np.sqrt((np.abs(series) ** 2).sum(axis=1) / 2)
+    print(f"K {mean:.3f} + {slope:.3f} s/m (speed - mean), residual sd {scatter:.3f}")
     for c, name in enumerate(CHANNELS):
         slope = np.polyfit(np.log(speed), np.log(energy[:, c]), 1)[0]
-        print(f"{name}: exponent of speed {slope:.2f}, log sd of rms at speed {np.std(np.log(energy[:, c]) - slope * np.log(speed)):.2f}")
-    for name in ("residual_rms", "residual_hz"):
+        print(
+            f"{name}: exponent of speed {slope:.2f}, log sd of rms at speed {np.std(np.log(energy[:, c]) - slope * np.log(speed)):.2f}"
+        )
+    for name in ("residual_rms", "residual_hz", "gain_sd", "mean_sd"):
         values = np.array([np.median([getattr(r, name) for r in rows], axis=0) for rows in people.values()])
         print(name, np.median(values, axis=0).round(3))
-    log = np.log(np.abs(series)) - np.log(energy)[:, None, :]
-    print(f"log sd of a harmonic relative to its channel {np.median(log.std(axis=0)):.2f}")
+    print(f"median log sd of a harmonic about its channel {np.median(log_sd):.2f}")
 
 
 if __name__ == "__main__":

@@ -36,7 +36,9 @@ class Walk:
     def steady(self) -> tuple[slice, slice]:
         """The two stretches of straight, steady walking."""
         margin = int(STEADY_MARGIN_S * RATE_HZ)
-        return slice(self.start + margin, self.turn_start - margin // 2), slice(self.turn_stop + margin // 2, self.stop - margin)
+        return slice(self.start + margin, self.turn_start - margin // 2), slice(
+            self.turn_stop + margin // 2, self.stop - margin
+        )
 
 
 def level(walk: Walk) -> Walk:
@@ -52,10 +54,20 @@ def level(walk: Walk) -> Walk:
     return replace(walk, specific_force=walk.specific_force @ axes.T, rate=walk.rate @ axes.T)
 
 
+def on_counter_grid(table: Array) -> Array:
+    """Rows put where their packet counter (column 0) says, lost packets filled in linearly.
+
+    61 of the 76 files lack rows, 5 % of all and mostly after the U-turn; the marks count packets, not rows.
+    """
+    counter, first = np.unique(table[:, 0], return_index=True)
+    grid = np.arange(counter[0], counter[-1] + 1)
+    return np.stack([np.interp(grid, counter, column) for column in table[first].T], axis=1)
+
+
 def load(folder: Path, name: str) -> Walk:
     """Read trial `name` ("subject-trial")."""
     meta = json.loads((folder / f"{name}.json").read_text())
-    table = np.loadtxt(folder / f"{name}_lb.txt.gz", skiprows=2)
+    table = on_counter_grid(np.loadtxt(folder / f"{name}_lb.txt.gz", skiprows=2))
     flu = [2, 1, 0]
     sign = np.array([-1.0, 1.0, 1.0])
     still = slice(20, max(60, meta["TrialBoundaries"][0] - 50))

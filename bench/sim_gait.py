@@ -34,8 +34,10 @@ FIRST_SWING_S = 0.4  # a trial is marked from its first toe-off, which precedes 
 def simulate(person: Person, rng: np.random.Generator, subject: int, trial: int) -> Walk:
     """Stand, walk 10 m, turn, walk back, stop, as a device reports it and as the recordings are read."""
     there = (WALKED_M, 0.0, 0.0)
-    route = plan_route([WayPoint((0.0, 0.0, 0.0), pause_s=5.0), WayPoint(there), WayPoint((0.0, 0.0, 0.0), pause_s=3.0)],
-                       person.preferred_speed_m_s)
+    route = plan_route(
+        [WayPoint((0.0, 0.0, 0.0), pause_s=5.0), WayPoint(there), WayPoint((0.0, 0.0, 0.0), pause_s=3.0)],
+        person.preferred_speed_m_s,
+    )
     walker = Walker(person, route, rng)
     imu = Imu(draw_device(rng), RATE_HZ, rng)
     motion = walker.motion(imu.stamps_ns(0, int(walker.duration_s * 1e9)))
@@ -47,10 +49,17 @@ def simulate(person: Person, rng: np.random.Generator, subject: int, trial: int)
     (turn,) = walker.turns()
     strikes = sorted(marks["left"] + marks["right"])
     walk = Walk(
-        subject, trial, person.height_m, samples.accel_m_s2.astype(np.float64) * FLU_TO_FRD,
+        subject,
+        trial,
+        person.height_m,
+        samples.accel_m_s2.astype(np.float64) * FLU_TO_FRD,
         rate - rate[20 : int(4 * RATE_HZ)].mean(axis=0),
-        np.array(marks["left"]), np.array(marks["right"]),
-        strikes[0] - int(FIRST_SWING_S * RATE_HZ), round(turn.start_ns * 1e-9 * RATE_HZ), round(turn.stop_ns * 1e-9 * RATE_HZ), strikes[-1],
+        np.array(marks["left"]),
+        np.array(marks["right"]),
+        strikes[0] - int(FIRST_SWING_S * RATE_HZ),
+        round(turn.start_ns * 1e-9 * RATE_HZ),
+        round(turn.stop_ns * 1e-9 * RATE_HZ),
+        strikes[-1],
     )
     return level(walk)
 
@@ -88,15 +97,26 @@ def main() -> int:
     recorded = list(walks(folder, odd_subjects=arguments.calibration_half))
     real, sim = people_figures(recorded), people_figures(simulated(recorded))
     result = {}
-    print(f"{'':32}{'sim':>9}{'p10':>9}{'p90':>9}{'real':>9}{'p10':>9}{'p90':>9}  people {len(sim['steps'])} / {len(real['steps'])}")
+    print(
+        f"{'':32}{'sim':>9}{'p10':>9}{'p90':>9}{'real':>9}{'p10':>9}{'p90':>9}  people {len(sim['steps'])} / {len(real['steps'])}"
+    )
     for name, values in real.items():
         low, high = np.percentile(values, [10, 90])
         middle, (sim_low, sim_high) = np.median(sim[name]), np.percentile(sim[name], [10, 90])
         inside = bool(low <= middle <= high)
-        row = {"sim": middle, "sim_p10": sim_low, "sim_p90": sim_high, "real": np.median(values), "real_p10": low, "real_p90": high}
+        row = {
+            "sim": middle,
+            "sim_p10": sim_low,
+            "sim_p90": sim_high,
+            "real": np.median(values),
+            "real_p10": low,
+            "real_p90": high,
+        }
         result[name] = {key: round(float(value), 5) for key, value in row.items()} | {"in_band": inside}
         print(f"{name:32}" + "".join(f"{v:9.3f}" for v in row.values()) + ("" if inside else "  outside"))
-    print(f"{sum(r['in_band'] for r in result.values())} of {len(result)} simulated medians lie in the band of real people")
+    print(
+        f"{sum(r['in_band'] for r in result.values())} of {len(result)} simulated medians lie in the band of real people"
+    )
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         arguments.json.write_text(json.dumps({"gait": result}, indent=1) + "\n")

@@ -107,25 +107,19 @@ def _draw_harmonics(rng: np.random.Generator, step_frequency_hz: float) -> Compl
     """Complex displacement and angle amplitudes: the population's, scattered as its people are."""
     k = np.arange(1, gc.STRIDE_HARMONICS + 1)
     series = np.zeros((gc.STRIDE_HARMONICS, CHANNELS), dtype=np.complex128)
-    common = gc.GAIN_LOG_SD_COMMON * rng.standard_normal()
     for c, channel in enumerate(gc.CHANNELS):
-        gain = math.exp(common + gc.GAIN_LOG_SD_CHANNEL * rng.standard_normal())
+        gain = math.exp(gc.GAIN_LOG_SD[c] * rng.standard_normal())
         regular = k % 2 == (1 if channel.mirrors else 0)
         n = len(channel.amplitude)
+        amplitude = np.array(channel.amplitude) * np.exp(np.array(channel.amplitude_log_sd) * rng.standard_normal(n))
         phase = np.array(channel.phase_rad) + np.array(channel.phase_sd_rad) * rng.standard_normal(n)
-        series[regular, c] = gain * _scattered(rng, channel.amplitude) * np.exp(1j * phase)
-        series[~regular, c] = gain * _scattered(rng, channel.asymmetric_amplitude) * np.exp(2j * np.pi * rng.random(n))
+        series[regular, c] = gain * amplitude * np.exp(1j * phase)
+        limp = np.array(channel.asymmetric_amplitude) * np.exp(gc.ASYMMETRIC_LOG_SD * rng.standard_normal(n))
+        series[~regular, c] = gain * limp * np.exp(2j * np.pi * rng.random(n))
     omega = np.pi * step_frequency_hz * k
     series[:, :3] /= -(omega[:, None] ** 2)  # acceleration → displacement
     series[:, 3:] /= 1j * omega[:, None]  # rate → angle
     return series
-
-
-def _scattered(rng: np.random.Generator, amplitude: tuple[float, ...]) -> Array:
-    """Amplitudes scattered harmonic by harmonic, their energy kept."""
-    scattered = np.array(amplitude) * np.exp(gc.HARMONIC_LOG_SD * rng.standard_normal(len(amplitude)))
-    kept: Array = scattered * math.hypot(*amplitude) / np.linalg.norm(scattered)
-    return kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +134,9 @@ class Sway:
         return Sway(self.value + other.value, self.rate + other.rate, self.acceleration + other.acceleration)
 
 
-def periodic_motion(harmonics: ComplexArray, phase: tuple[Array, Array, Array], gain: tuple[Array, Array, Array]) -> Sway:
+def periodic_motion(
+    harmonics: ComplexArray, phase: tuple[Array, Array, Array], gain: tuple[Array, Array, Array]
+) -> Sway:
     """Waist motion of gain(t) · Re Σ harmonics_k exp(i k φ(t)).
 
     `phase` is φ and its two derivatives, (n,) each; `gain` the channels' gains and their derivatives, (n, 6) each.

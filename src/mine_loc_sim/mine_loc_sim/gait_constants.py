@@ -23,25 +23,28 @@ STEP_TIME_CV = 0.024  # measured 0.027, less the 0.010 s grid of its marks
 STEP_LENGTH_CV = 0.03  # assumed: scatter about the law
 STEP_TIME_ASYMMETRY_SD = 0.035  # measured: |left − right| / mean, median 0.03
 TURN_FOOT_RADIUS_M = 0.35  # assumed: what a turn on the spot costs in steps
-LEAST_STEP_M = 0.12  # assumed
+LEAST_STEP_M = 0.06  # assumed
 LEAST_STEP_TURN_RAD = 0.26  # assumed
 
 # Routes.
 ROUTE_SPACING_S = 0.4  # assumed: rounds corners and starts over about a second
 SPEED_CHANGE_M_S2 = 1.2  # assumed
-U_TURN_S = 1.4  # measured: with the rounding above, median peak rate 3.5 rad/s, median length 1.6 s
+U_TURN_S = 1.35  # measured: with the rounding above, between the measured median peak rate and length
 TURN_BASE_SHARE = 0.4  # assumed: share of a U-turn's length that any turn takes
 
 # The waist's motion: amplitudes at REFERENCE_SPEED_M_S and how they grow with speed.
 REFERENCE_SPEED_M_S = 1.15  # measured: mean of the subjects
-SPEED_EXPONENT = (1.8, 0.5, 2.0, 1.0, 2.1, 1.5)  # measured: of each channel's rms
-GAIN_LOG_SD_COMMON, GAIN_LOG_SD_CHANNEL = 0.15, 0.26  # measured: 0.30 in all; its split is assumed
-HARMONIC_LOG_SD = 0.6  # measured, about the channel's rms
-STEP_GAIN_SD = (0.09, 0.13, 0.075, 0.075, 0.14, 0.13)  # measured: gain of a stride on the mean stride
+SPEED_EXPONENT = (1.5, 0.3, 1.9, 0.35, 2.0, 1.3)  # measured: of each channel's rms
+GAIN_LOG_SD = (0.29, 0.14, 0.11, 0.16, 0.45, 0.39)  # measured: of each channel's rms about that
+ASYMMETRIC_LOG_SD = 0.5  # measured: of a harmonic about its channel's rms, median
+STEP_GAIN_SD = (0.084, 0.112, 0.073, 0.068, 0.116, 0.115)  # measured: gain of a stride on the mean stride
 
 # Motion that does not repeat, as deviation of acceleration [m/s²] (3) and angular rate [rad/s] (3).
-WALK_IRREGULARITY = (0.45, 0.40, 0.53, 0.066, 0.14, 0.13)  # measured residual about the mean stride; 0.7 of it, assumed
-WALK_IRREGULARITY_PEAK_HZ = 5.0  # assumed
+# measured: 0.9 of the rms of strides about the mean stride; the rest is their timing and gain, assumed
+WALK_IRREGULARITY = (0.50, 0.47, 0.56, 0.08, 0.165, 0.13)
+WALK_IRREGULARITY_PEAK_HZ = 7.0  # measured: median frequency of that, of the accelerations
+WALK_WANDER = (0.09, 0.05, 0.02, 0.010, 0.019, 0.032)  # measured: scatter of strides' means; up assumed
+WALK_WANDER_PEAK_HZ = 0.5  # assumed: they alternate, so about every second stride
 STANDING_SWAY = (0.015, 0.015, 0.008, 0.006, 0.006, 0.008)  # assumed
 STANDING_SWAY_PEAK_HZ = 0.5  # assumed
 
@@ -59,35 +62,66 @@ class Channel:
     name: str
     mirrors: bool
     amplitude: tuple[float, ...]
+    amplitude_log_sd: tuple[float, ...]
     phase_rad: tuple[float, ...]
     phase_sd_rad: tuple[float, ...]
     asymmetric_amplitude: tuple[float, ...]
 
 
-# measured: median amplitude, circular mean and spread of the phase over subjects.
+# measured: median amplitude and log deviation about the channel's rms, circular mean and spread of the phase over subjects.
 CHANNELS = (
-    Channel("forward", False, (1.344, 0.661, 0.582, 0.359, 0.210, 0.146, 0.129, 0.113),
-            (1.28, 0.95, 0.40, -0.21, 0.35, -0.44, 2.31, 1.49),
-            (0.12, 0.31, 0.34, 0.72, 0.92, 1.48, 1.19, 0.92),
-            (0.072, 0.055, 0.082, 0.114, 0.073, 0.078, 0.053, 0.060)),
-    Channel("left", True, (0.552, 0.274, 0.475, 0.552, 0.337, 0.360, 0.252, 0.144),
-            (1.51, -2.61, 2.35, 0.93, 0.13, -0.29, -0.65, -1.10),
-            (0.20, 1.38, 0.24, 0.89, 1.17, 0.76, 0.77, 1.07),
-            (0.138, 0.064, 0.143, 0.169, 0.079, 0.050, 0.081, 0.058)),
-    Channel("up", False, (2.109, 0.429, 0.766, 1.113, 0.623, 0.437, 0.296, 0.105),
-            (-0.71, -0.27, -0.09, -1.43, -2.31, -2.61, -2.71, -2.78),
-            (0.24, 0.96, 0.48, 0.63, 0.56, 1.14, 2.19, 1.15),
-            (0.124, 0.133, 0.183, 0.155, 0.214, 0.226, 0.122, 0.084)),
-    Channel("roll", True, (0.295, 0.316, 0.074, 0.061, 0.032, 0.055, 0.024, 0.016),
-            (-0.26, -1.50, -2.27, -3.12, -2.93, 2.45, 2.03, 1.86),
-            (0.57, 0.20, 0.51, 1.11, 0.89, 0.54, 0.93, 1.03),
-            (0.052, 0.030, 0.024, 0.032, 0.025, 0.011, 0.007, 0.007)),
-    Channel("pitch", False, (0.218, 0.076, 0.131, 0.058, 0.059, 0.027, 0.038, 0.027),
-            (3.01, 2.92, -1.03, -0.78, -2.07, 3.12, -1.44, -1.78),
-            (0.83, 1.25, 0.64, 2.05, 2.23, 1.39, 1.45, 1.60),
-            (0.035, 0.022, 0.040, 0.020, 0.038, 0.024, 0.020, 0.025)),
-    Channel("yaw", True, (0.189, 0.078, 0.084, 0.089, 0.106, 0.076, 0.047, 0.020),
-            (-2.22, -1.97, -1.37, -2.76, 2.31, 1.50, 0.52, -0.06),
-            (0.73, 1.42, 0.39, 0.81, 0.92, 0.88, 0.92, 1.62),
-            (0.054, 0.014, 0.022, 0.032, 0.019, 0.018, 0.011, 0.013)),
+    Channel(
+        "forward",
+        False,
+        (1.524, 0.666, 0.726, 0.376, 0.198, 0.213, 0.172, 0.108),
+        (0.15, 0.41, 0.29, 0.58, 1.08, 0.70, 0.63, 0.42),
+        (1.24, 0.90, 0.40, -0.28, 0.32, -0.73, 2.20, 1.45),
+        (0.15, 0.35, 0.37, 0.74, 0.76, 1.62, 0.93, 0.84),
+        (0.093, 0.087, 0.088, 0.118, 0.070, 0.086, 0.063, 0.059),
+    ),
+    Channel(
+        "left",
+        True,
+        (0.595, 0.281, 0.580, 0.629, 0.478, 0.382, 0.263, 0.145),
+        (0.32, 0.49, 0.26, 0.25, 0.32, 0.42, 0.52, 0.50),
+        (1.47, -2.53, 2.33, 0.77, -0.03, -0.46, -0.77, -1.30),
+        (0.22, 1.37, 0.28, 0.88, 1.22, 0.90, 0.84, 1.17),
+        (0.138, 0.075, 0.142, 0.134, 0.091, 0.072, 0.087, 0.064),
+    ),
+    Channel(
+        "up",
+        False,
+        (2.138, 0.391, 0.695, 1.010, 0.590, 0.355, 0.249, 0.128),
+        (0.08, 0.38, 0.31, 0.32, 0.20, 0.32, 0.53, 0.69),
+        (-0.74, -0.37, -0.11, -1.47, -2.41, -2.73, 2.99, -2.88),
+        (0.25, 1.04, 0.49, 0.63, 0.64, 1.24, 1.86, 1.19),
+        (0.113, 0.151, 0.186, 0.155, 0.256, 0.203, 0.136, 0.116),
+    ),
+    Channel(
+        "roll",
+        True,
+        (0.291, 0.362, 0.122, 0.065, 0.032, 0.057, 0.032, 0.019),
+        (0.18, 0.11, 0.45, 0.67, 0.57, 0.41, 0.47, 0.89),
+        (-0.30, -1.58, -2.41, 3.12, -3.08, 2.40, 1.92, 1.69),
+        (0.60, 0.25, 0.51, 1.08, 0.92, 0.60, 1.12, 1.31),
+        (0.052, 0.034, 0.022, 0.034, 0.026, 0.014, 0.007, 0.007),
+    ),
+    Channel(
+        "pitch",
+        False,
+        (0.203, 0.092, 0.113, 0.055, 0.056, 0.043, 0.035, 0.027),
+        (0.57, 0.90, 0.44, 1.15, 0.78, 0.73, 1.08, 0.65),
+        (2.98, 2.81, -1.12, -1.83, 0.81, 2.00, -0.74, -1.51),
+        (0.88, 1.33, 0.61, 1.93, 2.07, 2.69, 1.03, 0.86),
+        (0.032, 0.019, 0.036, 0.027, 0.038, 0.030, 0.016, 0.025),
+    ),
+    Channel(
+        "yaw",
+        True,
+        (0.232, 0.102, 0.090, 0.110, 0.103, 0.084, 0.046, 0.025),
+        (0.24, 0.94, 0.52, 0.53, 0.47, 0.55, 0.47, 0.86),
+        (-2.29, -1.97, -1.41, -2.88, 2.20, 1.42, 0.55, -0.69),
+        (0.70, 1.58, 0.56, 0.89, 0.92, 1.10, 0.96, 2.05),
+        (0.050, 0.026, 0.023, 0.034, 0.019, 0.023, 0.014, 0.012),
+    ),
 )

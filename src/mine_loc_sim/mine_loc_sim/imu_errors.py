@@ -82,7 +82,9 @@ def draw_device(rng: np.random.Generator) -> DeviceErrors:
         matrix += spec.misalignment_sd_rad * rng.standard_normal((3, 3)) * (1 - np.eye(3))
         turn_on = rng.uniform(*spec.turn_on_bias, 3) * rng.choice([-1.0, 1.0], 3)
         drift = spec.bias_per_kelvin_sd * rng.standard_normal(3)
-        return Triad(matrix, turn_on, drift, rng.uniform(*spec.noise_density), rng.uniform(*spec.instability), spec.limit)
+        return Triad(
+            matrix, turn_on, drift, rng.uniform(*spec.noise_density), rng.uniform(*spec.instability), spec.limit
+        )
 
     mounting = Rotation.from_euler("ZYX", ic.MOUNTING_SD_RAD * rng.standard_normal(3))
     return DeviceErrors(triad(ic.GYRO), triad(ic.ACCEL), triad(ic.MAG), mounting, ic.AMBIENT_C)

@@ -94,7 +94,9 @@ def plan_route(way_points: Sequence[WayPoint], preferred_speed_m_s: float = gc.P
     along = _travelled(grid, times, distances, speeds)
     at_node = np.concatenate([[0.0], np.cumsum(lengths)])
     xyz = np.stack([np.interp(along, at_node, points[:, i]) for i in range(3)], axis=1)
-    heading = courses[0] + sum((t.angle_rad * _ease((grid - t.middle_s) / t.duration_s) for t in turns), np.zeros(len(grid)))
+    heading = courses[0] + sum(
+        (t.angle_rad * _ease((grid - t.middle_s) / t.duration_s) for t in turns), np.zeros(len(grid))
+    )
     return Route(SmoothCurve(0.0, gc.ROUTE_SPACING_S, np.column_stack([xyz, heading])), duration, turns)
 
 
@@ -105,7 +107,9 @@ def _check(way_points: Sequence[WayPoint], preferred_speed_m_s: float) -> None:
         raise ConfigurationError(f"route: preferred speed {preferred_speed_m_s} m/s, allowed: above 0")
     for i, w in enumerate(way_points):
         if w.speed_m_s is not None and not 0 < w.speed_m_s <= gc.MAX_SPEED_M_S:
-            raise ConfigurationError(f"route: way-point {i}: speed {w.speed_m_s} m/s, allowed: above 0 to {gc.MAX_SPEED_M_S}")
+            raise ConfigurationError(
+                f"route: way-point {i}: speed {w.speed_m_s} m/s, allowed: above 0 to {gc.MAX_SPEED_M_S}"
+            )
         if not w.pause_s >= 0:
             raise ConfigurationError(f"route: way-point {i}: pause {w.pause_s} s, allowed: 0 or more")
         if w.face_rad is not None and w.pause_s == 0:
@@ -190,7 +194,9 @@ def _turns(
             heading += angle
         angle = _wrapped(courses[i] - heading) if i < len(courses) else 0.0
         if abs(angle) > 1e-9:
-            turns.append(PlannedTurn(arrivals[i] + way_point.pause_s, turn_duration_s(angle, preferred_speed_m_s), angle))
+            turns.append(
+                PlannedTurn(arrivals[i] + way_point.pause_s, turn_duration_s(angle, preferred_speed_m_s), angle)
+            )
             heading += angle
     return tuple(turns)
 

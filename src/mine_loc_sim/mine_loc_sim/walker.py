@@ -48,7 +48,7 @@ class Walker:
         self.person = person
         self.start_ns = start_ns
         self._route = route
-        pacing, gait, walking, standing = rng.spawn(4)
+        pacing, gait, walking, wandering, standing = rng.spawn(5)
         strike_s, route_s = _pace(person, route, pacing)
         self.duration_s = float(np.interp(route.duration_s, route_s, strike_s))
         self._strike_s = strike_s
@@ -56,9 +56,11 @@ class Walker:
         self._phase = CubicSpline(strike_s, np.pi * np.arange(len(strike_s)))
         effort = _effort_m_s(route.at(self._route_time(strike_s)))
         self._gain = CubicSpline(strike_s, _gains(person, effort, gait))
+        relative, still = effort / gc.REFERENCE_SPEED_M_S, np.ones(len(effort))
         self._irregular = (
-            _irregular(walking, gc.WALK_IRREGULARITY_PEAK_HZ, gc.WALK_IRREGULARITY, strike_s, effort / gc.REFERENCE_SPEED_M_S),
-            _irregular(standing, gc.STANDING_SWAY_PEAK_HZ, gc.STANDING_SWAY, strike_s, np.ones(len(strike_s))),
+            _irregular(walking, gc.WALK_IRREGULARITY_PEAK_HZ, gc.WALK_IRREGULARITY, strike_s, relative),
+            _irregular(wandering, gc.WALK_WANDER_PEAK_HZ, gc.WALK_WANDER, strike_s, relative),
+            _irregular(standing, gc.STANDING_SWAY_PEAK_HZ, gc.STANDING_SWAY, strike_s, still),
         )
 
     def motion(self, stamp_ns: StampArray) -> WaistMotion:
