@@ -1,4 +1,4 @@
-"""Fit the measured constants of `mine_loc_sim.gait_constants` to the odd subjects of ipol_gait_lowerback and print them.
+"""Fit the measured constants of `mine_loc_sim.gait_constants` to the odd subjects of ipol_gait_lowerback.
 
     python bench/calibrate_gait.py
 
@@ -15,12 +15,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from gait_measures import PHASE_POINTS, strides
-from gait_recordings import RATE_HZ, Array, walks
-from mine_loc_sim.gait_constants import SPEED_CHANGE_M_S2
+from gait_recordings import Array, steady_speed, walks
 from scipy.spatial.transform import Rotation
 
 HARMONICS = 16
-WALKED_M = 20.0  # both ways, by the protocol
 CHANNELS = ("forward", "left", "up", "roll", "pitch", "yaw")
 MIRRORING = ("left", "roll", "yaw")  # change sign from a left to a right step: odd harmonics of the stride
 
@@ -52,14 +50,8 @@ def kinematic_harmonics(wave: Array, stride_s: float) -> np.ndarray:
     return np.hstack([acceleration, spectrum[:, 3:]])
 
 
-def steady_speed(duration_s: float) -> float:
-    """Speed v at which a route of a start, a reversal and a stop takes this long: WALKED_M / v + 2 v / a = duration."""
-    a = SPEED_CHANGE_M_S2
-    return (duration_s - float(np.sqrt(duration_s**2 - 8 * WALKED_M / a))) * a / 4
-
-
 def residual(waves: Array, stride_s: float) -> tuple[Array, Array, Array, Array]:
-    """Of strides (n, PHASE_POINTS, 6) about their mean: rms, frequency that halves the power, scatter of gain and mean."""
+    """Of strides (n, PHASE_POINTS, 6) about their mean: rms, median frequency of power, scatter of gain and of mean."""
     about = waves - waves.mean(axis=0)
     power = (np.abs(np.fft.rfft(about, axis=1)) ** 2).mean(axis=0)
     share = np.cumsum(power, axis=0) / power.sum(axis=0)
@@ -102,7 +94,7 @@ def main() -> None:
     for walk in walks(folder, odd_subjects=True):
         waves, durations = strides(walk)
         if len(durations) >= 4:
-            speed = steady_speed((walk.stop - walk.start) / RATE_HZ)
+            speed = steady_speed(walk)
             mean = kinematic_harmonics(waves.mean(axis=0), float(durations.mean()))
             rest = residual(waves, float(durations.mean()))
             people[walk.subject].append(Subject(walk.height_m, speed, 2 / float(durations.mean()), mean, *rest))
@@ -122,9 +114,8 @@ def main() -> None:
     print(f"K {mean:.3f} + {slope:.3f} s/m (speed - mean), residual sd {scatter:.3f}")
     for c, name in enumerate(CHANNELS):
         slope = np.polyfit(np.log(speed), np.log(energy[:, c]), 1)[0]
-        print(
-            f"{name}: exponent of speed {slope:.2f}, log sd of rms at speed {np.std(np.log(energy[:, c]) - slope * np.log(speed)):.2f}"
-        )
+        about = np.std(np.log(energy[:, c]) - slope * np.log(speed))
+        print(f"{name}: exponent of speed {slope:.2f}, log sd of rms at a speed {about:.2f}")
     for name in ("residual_rms", "residual_hz", "gain_sd", "mean_sd"):
         values = np.array([np.median([getattr(r, name) for r in rows], axis=0) for rows in people.values()])
         print(name, np.median(values, axis=0).round(3))

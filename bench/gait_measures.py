@@ -1,5 +1,7 @@
 """Figures of one recorded or simulated walk, the same computation for both."""
 
+import itertools
+
 import numpy as np
 from gait_recordings import RATE_HZ, Array, Walk
 from scipy.signal import butter, find_peaks, sosfiltfilt
@@ -10,7 +12,7 @@ TURNS = ("roll", "pitch", "yaw")
 
 
 def strides(walk: Walk) -> tuple[Array, Array]:
-    """Steady strides on a phase grid from left heel strike to left heel strike, (n, PHASE_POINTS, 6), and durations in s.
+    """Steady strides on a phase grid from left strike to left strike, (n, PHASE_POINTS, 6), and durations in s.
 
     The right heel strike is put at half the stride.
     """
@@ -20,7 +22,7 @@ def strides(walk: Walk) -> tuple[Array, Array]:
     waves, durations = [], []
     for window in walk.steady():
         left = walk.left_strike[(walk.left_strike >= window.start) & (walk.left_strike < window.stop)]
-        for a, b in zip(left[:-1], left[1:], strict=True):
+        for a, b in itertools.pairwise(left):
             between = walk.right_strike[(walk.right_strike > a) & (walk.right_strike < b)]
             if len(between) == 1 and 60 < b - a < 180:
                 at = np.interp(phase, [0, 1, 2], [a, between[0], b])
@@ -34,7 +36,7 @@ def step_times(walk: Walk) -> tuple[Array, Array]:
     marks = sorted([(t, 0) for t in walk.left_strike] + [(t, 1) for t in walk.right_strike])
     ending: tuple[list[float], list[float]] = ([], [])
     for window in walk.steady():
-        for (t0, foot0), (t1, foot1) in zip(marks[:-1], marks[1:], strict=True):
+        for (t0, foot0), (t1, foot1) in itertools.pairwise(marks):
             if foot0 != foot1 and window.start <= t0 and t1 < window.stop and 30 < t1 - t0 < 90:
                 ending[foot1].append((t1 - t0) / RATE_HZ)
     return np.array(ending[0]), np.array(ending[1])
@@ -54,7 +56,7 @@ def line_rms(walk: Walk, channel: int, frequency_hz: float) -> float:
 
 
 def harmonic_ratio(waves: Array, channel: int, *, in_phase_even: bool) -> float:
-    """Sum of in-phase over out-of-phase amplitudes of the stride's first 20 harmonics, mean over strides (Menz 2003)."""
+    """In-phase over out-of-phase amplitudes of the stride's first 20 harmonics, mean over strides (Menz 2003)."""
     amplitude = np.abs(np.fft.rfft(waves[:, :, channel], axis=1))[:, 1:21]
     odd, even = amplitude[:, 0::2].sum(axis=1), amplitude[:, 1::2].sum(axis=1)
     return float(np.mean(even / odd if in_phase_even else odd / even))

@@ -12,8 +12,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from mine_loc_sim.gait_constants import SPEED_CHANGE_M_S2
+
 Array = npt.NDArray[np.float64]
 RATE_HZ = 100.0
+WALKED_M = 20.0  # both ways, by the protocol
 STEADY_MARGIN_S = 1.5  # starts, stops and the U-turn's own steps are not steady walking
 
 
@@ -52,6 +55,13 @@ def level(walk: Walk) -> Walk:
     forward /= np.linalg.norm(forward)
     axes = np.stack([forward, np.cross(up, forward), up])
     return replace(walk, specific_force=walk.specific_force @ axes.T, rate=walk.rate @ axes.T)
+
+
+def steady_speed(walk: Walk) -> float:
+    """Speed v at which a start, a reversal and a stop fit the trial's duration: WALKED_M / v + 2 v / a = duration."""
+    duration_s = (walk.stop - walk.start) / RATE_HZ
+    a = SPEED_CHANGE_M_S2
+    return (duration_s - float(np.sqrt(duration_s**2 - 8 * WALKED_M / a))) * a / 4
 
 
 def on_counter_grid(table: Array) -> Array:

@@ -4,7 +4,8 @@
 
 The even subjects of ipol_gait_lowerback are scored: no constant was fitted to them. `--calibration-half` compares with
 the odd ones instead, on which the constants were measured (for development only). A figure is a subject's mean over
-trials; real p10–p90 over subjects is the band, and the simulated median over people should lie in it.
+trials; real p10–p90 over subjects is the band, and the simulated median over people should lie in it: once for people
+drawn from the population (of the recorded heights), once for people who also walk at the recorded speeds.
 """
 
 import argparse
@@ -18,7 +19,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from gait_measures import measure
-from gait_recordings import RATE_HZ, Walk, level, walks
+from gait_recordings import RATE_HZ, WALKED_M, Walk, level, steady_speed, walks
+
 from mine_loc_sim.gait import Person, draw_person
 from mine_loc_sim.imu_errors import FLU_TO_FRD, Imu, draw_device
 from mine_loc_sim.magnetic_field import GalleryField
@@ -27,13 +29,12 @@ from mine_loc_sim.walker import Walker
 
 PEOPLE_A_HEIGHT = 8
 TRIALS = 2
-WALKED_M = 10.0
 FIRST_SWING_S = 0.4  # a trial is marked from its first toe-off, which precedes the first heel strike by this
 
 
 def simulate(person: Person, rng: np.random.Generator, subject: int, trial: int) -> Walk:
     """Stand, walk 10 m, turn, walk back, stop, as a device reports it and as the recordings are read."""
-    there = (WALKED_M, 0.0, 0.0)
+    there = (WALKED_M / 2, 0.0, 0.0)
     route = plan_route(
         [WayPoint((0.0, 0.0, 0.0), pause_s=5.0), WayPoint(there), WayPoint((0.0, 0.0, 0.0), pause_s=3.0)],
         person.preferred_speed_m_s,
@@ -75,16 +76,43 @@ def people_figures(source: list[Walk]) -> dict[str, np.ndarray]:
     return {name: np.array([np.mean([t[name] for t in rows]) for rows in trials.values()]) for name in names}
 
 
-def simulated(real: list[Walk]) -> list[Walk]:
-    """Simulated people of the heights of the recorded ones, drawn from the population."""
-    heights = {walk.subject: walk.height_m for walk in real}
+def simulated(real: list[Walk], *, same_speed: bool) -> list[Walk]:
+    """Simulated people of the recorded ones' heights; of their speeds too if `same_speed`, else as the population."""
+    recorded = defaultdict(list)
+    for walk in real:
+        recorded[walk.subject].append(walk)
     result = []
-    for subject, height in heights.items():
+    for subject, trials in recorded.items():
+        speed = float(np.median([steady_speed(walk) for walk in trials])) if same_speed else None
         for i in range(PEOPLE_A_HEIGHT):
             rng = np.random.default_rng([subject, i])
-            person = draw_person(rng, height_m=height)
+            person = draw_person(rng, height_m=trials[0].height_m, preferred_speed_m_s=speed)
             result += [simulate(person, rng, subject * 100 + i, trial) for trial in range(TRIALS)]
     return result
+
+
+def compare(real: np.ndarray, sim: np.ndarray, same_speed: np.ndarray) -> dict[str, float | bool]:
+    """One figure's row: medians and 10–90 % over people."""
+    values = {"sim": sim, "sim_same_speed": same_speed, "real": real}
+    row = {name: float(np.median(v)) for name, v in values.items()}
+    for name in ("sim", "real"):
+        row[f"{name}_p10"], row[f"{name}_p90"] = map(float, np.percentile(values[name], [10, 90]))
+    rounded: dict[str, float | bool] = {key: round(value, 5) for key, value in row.items()}
+    rounded["in_band"] = row["real_p10"] <= row["sim"] <= row["real_p90"]
+    rounded["in_band_same_speed"] = row["real_p10"] <= row["sim_same_speed"] <= row["real_p90"]
+    return rounded
+
+
+def print_table(result: dict[str, dict[str, float | bool]]) -> None:
+    """The figures side by side; a star marks a simulated median outside the band of real people."""
+    columns = ("sim", "sim_p10", "sim_p90", "sim_same_speed", "real", "real_p10", "real_p90")
+    print(f"{'':32}" + "".join(f"{c.replace('sim_same_speed', 'same v'):>10}" for c in columns))
+    for name, row in result.items():
+        stars = {"sim": "in_band", "sim_same_speed": "in_band_same_speed"}
+        cells = (f"{row[c]:9.3f}" + ("*" if c in stars and not row[stars[c]] else " ") for c in columns)
+        print(f"{name:32}" + "".join(cells))
+    for key in ("in_band", "in_band_same_speed"):
+        print(f"{key}: {sum(bool(r[key]) for r in result.values())} of {len(result)} simulated medians")
 
 
 def main() -> int:
@@ -95,28 +123,12 @@ def main() -> int:
     arguments = parser.parse_args()
     folder = Path(os.environ["MINE_LOC_DATA"]) / "ipol_gait_lowerback" / "GaitData"
     recorded = list(walks(folder, odd_subjects=arguments.calibration_half))
-    real, sim = people_figures(recorded), people_figures(simulated(recorded))
-    result = {}
-    print(
-        f"{'':32}{'sim':>9}{'p10':>9}{'p90':>9}{'real':>9}{'p10':>9}{'p90':>9}  people {len(sim['steps'])} / {len(real['steps'])}"
-    )
-    for name, values in real.items():
-        low, high = np.percentile(values, [10, 90])
-        middle, (sim_low, sim_high) = np.median(sim[name]), np.percentile(sim[name], [10, 90])
-        inside = bool(low <= middle <= high)
-        row = {
-            "sim": middle,
-            "sim_p10": sim_low,
-            "sim_p90": sim_high,
-            "real": np.median(values),
-            "real_p10": low,
-            "real_p90": high,
-        }
-        result[name] = {key: round(float(value), 5) for key, value in row.items()} | {"in_band": inside}
-        print(f"{name:32}" + "".join(f"{v:9.3f}" for v in row.values()) + ("" if inside else "  outside"))
-    print(
-        f"{sum(r['in_band'] for r in result.values())} of {len(result)} simulated medians lie in the band of real people"
-    )
+    real = people_figures(recorded)
+    sim = people_figures(simulated(recorded, same_speed=False))
+    same_speed = people_figures(simulated(recorded, same_speed=True))
+    result = {name: compare(real[name], sim[name], same_speed[name]) for name in real}
+    print(f"{len(real['steps'])} recorded people, {len(sim['steps'])} simulated")
+    print_table(result)
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         arguments.json.write_text(json.dumps({"gait": result}, indent=1) + "\n")

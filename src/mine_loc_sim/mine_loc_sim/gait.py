@@ -173,4 +173,5 @@ class IrregularMotion:
 def control_instants_s(peak_hz: float, duration_s: float) -> Array:
     """Where the control points of an IrregularMotion of this peak frequency lie."""
     spacing = PEAK / peak_hz
-    return spacing * np.arange(math.ceil(duration_s / spacing) + 1)
+    instants: Array = spacing * np.arange(math.ceil(duration_s / spacing) + 1, dtype=np.float64)
+    return instants

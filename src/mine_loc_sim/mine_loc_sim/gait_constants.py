@@ -35,6 +35,7 @@ TURN_BASE_SHARE = 0.4  # assumed: share of a U-turn's length that any turn takes
 # The waist's motion: amplitudes at REFERENCE_SPEED_M_S and how they grow with speed.
 REFERENCE_SPEED_M_S = 1.15  # measured: mean of the subjects
 SPEED_EXPONENT = (1.5, 0.3, 1.9, 0.35, 2.0, 1.3)  # measured: of each channel's rms
+FULL_GAIT_SPEED_SHARE = 0.4  # assumed: slower than this share of the reference speed, gait fades into standing
 GAIN_LOG_SD = (0.29, 0.14, 0.11, 0.16, 0.45, 0.39)  # measured: of each channel's rms about that
 ASYMMETRIC_LOG_SD = 0.5  # measured: of a harmonic about its channel's rms, median
 STEP_GAIN_SD = (0.084, 0.112, 0.073, 0.068, 0.116, 0.115)  # measured: gain of a stride on the mean stride
@@ -56,7 +57,8 @@ class Channel:
     """Harmonics of one channel against the phase of the stride, 0 at a left heel strike.
 
     A mirroring channel changes sign from a left to a right step, so its regular harmonics of the stride are 1, 3, …;
-    the others' are 2, 4, …. What remains is left-right asymmetry, of any phase. Accelerations in m/s², rates of the angles in rad/s.
+    the others' are 2, 4, …. What remains is left-right asymmetry, of any phase. Accelerations in
+    m/s², rates of the angles in rad/s.
     """
 
     name: str
@@ -68,60 +70,60 @@ class Channel:
     asymmetric_amplitude: tuple[float, ...]
 
 
-# measured: median amplitude and log deviation about the channel's rms, circular mean and spread of the phase over subjects.
+# measured, over subjects: median amplitude, log deviation about the channel's rms, circular mean and spread of phase.
 CHANNELS = (
     Channel(
         "forward",
-        False,
-        (1.524, 0.666, 0.726, 0.376, 0.198, 0.213, 0.172, 0.108),
-        (0.15, 0.41, 0.29, 0.58, 1.08, 0.70, 0.63, 0.42),
-        (1.24, 0.90, 0.40, -0.28, 0.32, -0.73, 2.20, 1.45),
-        (0.15, 0.35, 0.37, 0.74, 0.76, 1.62, 0.93, 0.84),
-        (0.093, 0.087, 0.088, 0.118, 0.070, 0.086, 0.063, 0.059),
+        mirrors=False,
+        amplitude=(1.524, 0.666, 0.726, 0.376, 0.198, 0.213, 0.172, 0.108),
+        amplitude_log_sd=(0.15, 0.41, 0.29, 0.58, 1.08, 0.70, 0.63, 0.42),
+        phase_rad=(1.24, 0.90, 0.40, -0.28, 0.32, -0.73, 2.20, 1.45),
+        phase_sd_rad=(0.15, 0.35, 0.37, 0.74, 0.76, 1.62, 0.93, 0.84),
+        asymmetric_amplitude=(0.093, 0.087, 0.088, 0.118, 0.070, 0.086, 0.063, 0.059),
     ),
     Channel(
         "left",
-        True,
-        (0.595, 0.281, 0.580, 0.629, 0.478, 0.382, 0.263, 0.145),
-        (0.32, 0.49, 0.26, 0.25, 0.32, 0.42, 0.52, 0.50),
-        (1.47, -2.53, 2.33, 0.77, -0.03, -0.46, -0.77, -1.30),
-        (0.22, 1.37, 0.28, 0.88, 1.22, 0.90, 0.84, 1.17),
-        (0.138, 0.075, 0.142, 0.134, 0.091, 0.072, 0.087, 0.064),
+        mirrors=True,
+        amplitude=(0.595, 0.281, 0.580, 0.629, 0.478, 0.382, 0.263, 0.145),
+        amplitude_log_sd=(0.32, 0.49, 0.26, 0.25, 0.32, 0.42, 0.52, 0.50),
+        phase_rad=(1.47, -2.53, 2.33, 0.77, -0.03, -0.46, -0.77, -1.30),
+        phase_sd_rad=(0.22, 1.37, 0.28, 0.88, 1.22, 0.90, 0.84, 1.17),
+        asymmetric_amplitude=(0.138, 0.075, 0.142, 0.134, 0.091, 0.072, 0.087, 0.064),
     ),
     Channel(
         "up",
-        False,
-        (2.138, 0.391, 0.695, 1.010, 0.590, 0.355, 0.249, 0.128),
-        (0.08, 0.38, 0.31, 0.32, 0.20, 0.32, 0.53, 0.69),
-        (-0.74, -0.37, -0.11, -1.47, -2.41, -2.73, 2.99, -2.88),
-        (0.25, 1.04, 0.49, 0.63, 0.64, 1.24, 1.86, 1.19),
-        (0.113, 0.151, 0.186, 0.155, 0.256, 0.203, 0.136, 0.116),
+        mirrors=False,
+        amplitude=(2.138, 0.391, 0.695, 1.010, 0.590, 0.355, 0.249, 0.128),
+        amplitude_log_sd=(0.08, 0.38, 0.31, 0.32, 0.20, 0.32, 0.53, 0.69),
+        phase_rad=(-0.74, -0.37, -0.11, -1.47, -2.41, -2.73, 2.99, -2.88),
+        phase_sd_rad=(0.25, 1.04, 0.49, 0.63, 0.64, 1.24, 1.86, 1.19),
+        asymmetric_amplitude=(0.113, 0.151, 0.186, 0.155, 0.256, 0.203, 0.136, 0.116),
     ),
     Channel(
         "roll",
-        True,
-        (0.291, 0.362, 0.122, 0.065, 0.032, 0.057, 0.032, 0.019),
-        (0.18, 0.11, 0.45, 0.67, 0.57, 0.41, 0.47, 0.89),
-        (-0.30, -1.58, -2.41, 3.12, -3.08, 2.40, 1.92, 1.69),
-        (0.60, 0.25, 0.51, 1.08, 0.92, 0.60, 1.12, 1.31),
-        (0.052, 0.034, 0.022, 0.034, 0.026, 0.014, 0.007, 0.007),
+        mirrors=True,
+        amplitude=(0.291, 0.362, 0.122, 0.065, 0.032, 0.057, 0.032, 0.019),
+        amplitude_log_sd=(0.18, 0.11, 0.45, 0.67, 0.57, 0.41, 0.47, 0.89),
+        phase_rad=(-0.30, -1.58, -2.41, 3.12, -3.08, 2.40, 1.92, 1.69),
+        phase_sd_rad=(0.60, 0.25, 0.51, 1.08, 0.92, 0.60, 1.12, 1.31),
+        asymmetric_amplitude=(0.052, 0.034, 0.022, 0.034, 0.026, 0.014, 0.007, 0.007),
     ),
     Channel(
         "pitch",
-        False,
-        (0.203, 0.092, 0.113, 0.055, 0.056, 0.043, 0.035, 0.027),
-        (0.57, 0.90, 0.44, 1.15, 0.78, 0.73, 1.08, 0.65),
-        (2.98, 2.81, -1.12, -1.83, 0.81, 2.00, -0.74, -1.51),
-        (0.88, 1.33, 0.61, 1.93, 2.07, 2.69, 1.03, 0.86),
-        (0.032, 0.019, 0.036, 0.027, 0.038, 0.030, 0.016, 0.025),
+        mirrors=False,
+        amplitude=(0.203, 0.092, 0.113, 0.055, 0.056, 0.043, 0.035, 0.027),
+        amplitude_log_sd=(0.57, 0.90, 0.44, 1.15, 0.78, 0.73, 1.08, 0.65),
+        phase_rad=(2.98, 2.81, -1.12, -1.83, 0.81, 2.00, -0.74, -1.51),
+        phase_sd_rad=(0.88, 1.33, 0.61, 1.93, 2.07, 2.69, 1.03, 0.86),
+        asymmetric_amplitude=(0.032, 0.019, 0.036, 0.027, 0.038, 0.030, 0.016, 0.025),
     ),
     Channel(
         "yaw",
-        True,
-        (0.232, 0.102, 0.090, 0.110, 0.103, 0.084, 0.046, 0.025),
-        (0.24, 0.94, 0.52, 0.53, 0.47, 0.55, 0.47, 0.86),
-        (-2.29, -1.97, -1.41, -2.88, 2.20, 1.42, 0.55, -0.69),
-        (0.70, 1.58, 0.56, 0.89, 0.92, 1.10, 0.96, 2.05),
-        (0.050, 0.026, 0.023, 0.034, 0.019, 0.023, 0.014, 0.012),
+        mirrors=True,
+        amplitude=(0.232, 0.102, 0.090, 0.110, 0.103, 0.084, 0.046, 0.025),
+        amplitude_log_sd=(0.24, 0.94, 0.52, 0.53, 0.47, 0.55, 0.47, 0.86),
+        phase_rad=(-2.29, -1.97, -1.41, -2.88, 2.20, 1.42, 0.55, -0.69),
+        phase_sd_rad=(0.70, 1.58, 0.56, 0.89, 0.92, 1.10, 0.96, 2.05),
+        asymmetric_amplitude=(0.050, 0.026, 0.023, 0.034, 0.019, 0.023, 0.014, 0.012),
     ),
 )

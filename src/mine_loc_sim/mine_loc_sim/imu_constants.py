@@ -1,8 +1,8 @@
 """Every free constant of the inertial unit and of the magnetic field it sits in, with its source.
 
-"class" = figures of chips and modules of the N100's class (ICM-42688, ICM-20602, BMI055, BMI160, BMI270 data sheets as
-compared in public tables, Xsens MTi-1): gyro 0.003–0.014 °/s/√Hz, accelerometer 75–160 µg/√Hz. "captured" = a frame of a
-real N100 in a public repository. "assumed" has no source.
+"class" = figures of chips and modules of the N100's class (ICM-42688, ICM-20602, BMI055, BMI160, BMI270, Xsens MTi-1):
+gyro 0.003–0.014 °/s/√Hz, accelerometer 75–160 µg/√Hz. "captured" = a frame of a real N100 in a public repository.
+"assumed" has no source.
 """
 
 import math

@@ -35,7 +35,7 @@ class ImuSamples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triad:
-    """Errors of three orthogonal sensors, in the sensor's unit: measured = matrix · true + bias(temperature, time) + noise.
+    """Errors of three orthogonal sensors in their unit: measured = matrix · true + bias(temperature, time) + noise.
 
     `noise_density` is per √Hz, `instability` the deviation of a slow Gauss-Markov bias, `limit` the largest output.
     """
@@ -112,7 +112,7 @@ class Imu:
         return start_ns + offsets
 
     def sample(self, motion: WaistMotion, magnetic_field_t: Array) -> ImuSamples:
-        """Measure the next n samples; `magnetic_field_t` (n, 3) is the field at the device in the map frame, in tesla."""
+        """Measure the next n samples; `magnetic_field_t` (n, 3) is the field at the device, map frame, in tesla."""
         count = len(motion.stamp_ns)
         age_s = (self._samples + np.arange(count)) / self.rate_hz
         self._samples += count

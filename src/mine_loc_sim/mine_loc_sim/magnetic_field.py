@@ -1,4 +1,4 @@
-"""The magnetic field in a gallery: Earth's, and that of rails, arches and machines, which differs from metre to metre."""
+"""The magnetic field in a gallery: Earth's, and that of rails, arches and machines, different every metre."""
 
 import numpy as np
 import numpy.typing as npt

@@ -128,7 +128,7 @@ def _wrapped(angle_rad: float) -> float:
 def _node_speeds(way_points: Sequence[WayPoint], cruise: Array, lengths: Array, corner: Array) -> Array:
     """Speed at each way-point: 0 at ends and pauses, cos(half the turn) of cruise at corners, all reachable."""
     around = np.minimum(np.append(cruise, cruise[-1]), np.insert(cruise, 0, cruise[0]))
-    speed = around * np.maximum(np.cos(corner / 2), 0.0)
+    speed: Array = around * np.maximum(np.cos(corner / 2), 0.0)
     speed[[0, -1]] = 0.0
     speed[[w.pause_s > 0 for w in way_points]] = 0.0
     for i in range(len(lengths)):

@@ -17,7 +17,7 @@ PEAK = 1.0 / np.pi
 
 
 class SmoothCurve:
-    """A curve (m columns) with control point i at `start_s + i * spacing_s`; constant before the first and after the last."""
+    """A curve (m columns) with control point i at `start_s + i * spacing_s`; constant beyond both ends."""
 
     def __init__(self, start_s: float, spacing_s: float, controls: Array) -> None:
         padded = np.pad(controls, ((DEGREE + 1, DEGREE + 1), (0, 0)), mode="edge")

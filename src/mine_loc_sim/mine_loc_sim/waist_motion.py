@@ -18,7 +18,7 @@ StampArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WaistMotion:
-    """Truth at n instants: position, velocity, acceleration in the map (n, 3); attitude (n, 4); rate, force in the body."""
+    """Truth at n instants: position and derivatives in the map (n, 3), attitude (n, 4), rate and force in the body."""
 
     stamp_ns: StampArray
     position_m: Array
@@ -31,7 +31,7 @@ class WaistMotion:
 
 
 def compose(stamp_ns: StampArray, path: Pose, sway: Sway, waist_height_m: float) -> WaistMotion:
-    """Put the waist's motion in the heading frame onto the path, with all derivatives (horizontal in the complex plane)."""
+    """Put the waist's motion in the heading frame onto the path, with derivatives (horizontal as complex numbers)."""
     turn = np.exp(1j * path.heading_rad)
     h1, h2 = path.turn_rate_rad_s, path.turn_acceleration_rad_s2
     d, d1, d2 = (x[:, 0] + 1j * x[:, 1] for x in (sway.value, sway.rate, sway.acceleration))
@@ -54,7 +54,7 @@ def compose(stamp_ns: StampArray, path: Pose, sway: Sway, waist_height_m: float)
 
 
 def _in_body(angles: Array, rates: Array, vector: Array) -> tuple[Array, Array, Array]:
-    """Quaternion, a map vector in the body, and the body's angular rate for roll, pitch, yaw (Diebel 2006, 1-2-3 sequence)."""
+    """Quaternion, a map vector in the body and the body's angular rate, of roll, pitch, yaw (Diebel 2006)."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles / 2).T, np.cos(angles / 2).T
     orientation = np.column_stack(
         [

@@ -64,7 +64,7 @@ class Walker:
         )
 
     def motion(self, stamp_ns: StampArray) -> WaistMotion:
-        """True motion of the waist at integer-nanosecond stamps (n,); standing still before the start and after the end."""
+        """True motion of the waist at integer-nanosecond stamps (n,); motionless before the start and after the end."""
         t_s = (stamp_ns - self.start_ns) / NS_PER_S
         t = np.clip(t_s, self._strike_s[0], self._strike_s[-1])
         path = self._path(t)
@@ -154,10 +154,12 @@ def _gains(person: Person, effort_m_s: Array, rng: np.random.Generator) -> Array
     """Gain of each channel's series at each strike, (n, 6): by speed and cadence, with step-to-step scatter."""
     relative = effort_m_s / gc.REFERENCE_SPEED_M_S
     cadence = person.law.frequency_hz(effort_m_s) / person.reference_frequency_hz
-    gains = relative[:, None] ** np.array(gc.SPEED_EXPONENT)
+    fade = np.minimum(relative / gc.FULL_GAIT_SPEED_SHARE, 1.0)[:, None]
+    gains: Array = fade * relative[:, None] ** np.array(gc.SPEED_EXPONENT)
     gains[:, :3] /= cadence[:, None] ** 2  # of acceleration → of displacement
     gains[:, 3:] /= cadence[:, None]  # of rate → of angle
-    return gains * (1.0 + np.array(gc.STEP_GAIN_SD) * rng.standard_normal(gains.shape))
+    gains *= 1.0 + np.array(gc.STEP_GAIN_SD) * rng.standard_normal(gains.shape)
+    return gains
 
 
 def _irregular(
