@@ -4,7 +4,7 @@ No noise figures of the N100 are public: the defaults are those of its class (`i
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -57,12 +57,6 @@ class DeviceErrors:
     mag: Triad
     mounting: Rotation
     ambient_c: float
-
-    def with_turn_on_bias(self, gyro_rad_s: Array, accel_m_s2: Array) -> "DeviceErrors":
-        """The same device switched on again."""
-        return replace(
-            self, gyro=replace(self.gyro, turn_on_bias=gyro_rad_s), accel=replace(self.accel, turn_on_bias=accel_m_s2)
-        )
 
 
 def ideal_device() -> DeviceErrors:

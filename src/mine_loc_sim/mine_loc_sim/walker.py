@@ -55,7 +55,7 @@ class Walker:
         self._route_time = CubicSpline(strike_s, route_s)
         self._phase = CubicSpline(strike_s, np.pi * np.arange(len(strike_s)))
         effort = _effort_m_s(route.at(self._route_time(strike_s)))
-        self._gain = CubicSpline(strike_s, _gains(person, effort, gait))
+        self._gain = CubicSpline(strike_s, _gains(person, effort, gait), bc_type="clamped")
         relative, still = effort / gc.REFERENCE_SPEED_M_S, np.ones(len(effort))
         self._irregular = (
             _irregular(walking, gc.WALK_IRREGULARITY_PEAK_HZ, gc.WALK_IRREGULARITY, strike_s, relative),
