@@ -143,8 +143,11 @@ def periodic_motion(
     """
     k = np.arange(1, len(harmonics) + 1)[:, None]
     stack = np.hstack([harmonics, 1j * k * harmonics, -(k**2) * harmonics])
-    angle = np.multiply.outer(phase[0], k[:, 0])
-    shape = np.cos(angle) @ stack.real - np.sin(angle) @ stack.imag
+    powers = np.empty((len(harmonics), len(phase[0])), dtype=np.complex128)
+    powers[0] = np.exp(1j * phase[0])
+    for i in range(1, len(powers)):
+        np.multiply(powers[i - 1], powers[0], out=powers[i])  # far cheaper than so many sines
+    shape = (stack.T @ powers).real.T
     s, s1, s2 = shape[:, :CHANNELS], shape[:, CHANNELS : 2 * CHANNELS], shape[:, 2 * CHANNELS :]
     p1, p2 = phase[1][:, None], phase[2][:, None]
     g, g1, g2 = gain
@@ -155,14 +158,13 @@ def periodic_motion(
 class IrregularMotion:
     """Random waist motion with exact derivatives: what of real walking or standing does not repeat.
 
-    `deviation` (6,) are deviations of the acceleration [m/s²] and of the angular rate [rad/s], reached where
-    `activity` (one number a control point) is 1.
+    `deviation` (m, 6), one row a control point, are deviations of acceleration [m/s²] (3) and angular rate [rad/s] (3).
     """
 
-    def __init__(self, rng: np.random.Generator, peak_hz: float, deviation: Array, activity: Array) -> None:
+    def __init__(self, rng: np.random.Generator, peak_hz: float, deviation: Array) -> None:
         self._spacing_s = PEAK / peak_hz
         gains = [white_control_gain(2) / self._spacing_s**2] * 3 + [white_control_gain(1) / self._spacing_s] * 3
-        controls = rng.standard_normal((len(activity), CHANNELS)) * activity[:, None] * deviation / np.array(gains)
+        controls = rng.standard_normal(deviation.shape) * deviation / np.array(gains)
         self._curve = SmoothCurve(0.0, self._spacing_s, controls)
 
     def at(self, t_s: Array) -> Sway:

@@ -43,11 +43,10 @@ STEP_GAIN_SD = (0.084, 0.112, 0.073, 0.068, 0.116, 0.115)  # measured: gain of a
 # Motion that does not repeat, as deviation of acceleration [m/s²] (3) and angular rate [rad/s] (3).
 # measured: 0.9 of the rms of strides about the mean stride; the rest is their timing and gain, assumed
 WALK_IRREGULARITY = (0.50, 0.47, 0.56, 0.08, 0.165, 0.13)
-WALK_IRREGULARITY_PEAK_HZ = 7.0  # measured: median frequency of that, of the accelerations
+IRREGULARITY_PEAK_HZ = 7.0  # measured: median frequency of that, of the accelerations
 WALK_WANDER = (0.09, 0.05, 0.02, 0.010, 0.019, 0.032)  # measured: scatter of strides' means; up assumed
-WALK_WANDER_PEAK_HZ = 0.5  # assumed: they alternate, so about every second stride
 STANDING_SWAY = (0.015, 0.015, 0.008, 0.006, 0.006, 0.008)  # assumed
-STANDING_SWAY_PEAK_HZ = 0.5  # assumed
+WANDER_PEAK_HZ = 0.5  # assumed: strides' means alternate, so about every second stride; sway likewise
 
 STRIDE_HARMONICS = 16
 

@@ -48,7 +48,7 @@ class Walker:
         self.person = person
         self.start_ns = start_ns
         self._route = route
-        pacing, gait, walking, wandering, standing = rng.spawn(5)
+        pacing, gait, fast, slow = rng.spawn(4)
         strike_s, route_s = _pace(person, route, pacing)
         self.duration_s = float(np.interp(route.duration_s, route_s, strike_s))
         self._strike_s = strike_s
@@ -56,15 +56,19 @@ class Walker:
         self._phase = CubicSpline(strike_s, np.pi * np.arange(len(strike_s)))
         effort = _effort_m_s(route.at(self._route_time(strike_s)))
         self._gain = CubicSpline(strike_s, _gains(person, effort, gait), bc_type="clamped")
-        relative, still = effort / gc.REFERENCE_SPEED_M_S, np.ones(len(effort))
+        relative = effort / gc.REFERENCE_SPEED_M_S
         self._irregular = (
-            _irregular(walking, gc.WALK_IRREGULARITY_PEAK_HZ, gc.WALK_IRREGULARITY, strike_s, relative),
-            _irregular(wandering, gc.WALK_WANDER_PEAK_HZ, gc.WALK_WANDER, strike_s, relative),
-            _irregular(standing, gc.STANDING_SWAY_PEAK_HZ, gc.STANDING_SWAY, strike_s, still),
+            _irregular(fast, gc.IRREGULARITY_PEAK_HZ, strike_s, np.outer(relative, gc.WALK_IRREGULARITY)),
+            _irregular(
+                slow, gc.WANDER_PEAK_HZ, strike_s, np.hypot(np.outer(relative, gc.WALK_WANDER), gc.STANDING_SWAY)
+            ),
         )
 
     def motion(self, stamp_ns: StampArray) -> WaistMotion:
-        """True motion of the waist at integer-nanosecond stamps (n,); motionless before the start and after the end."""
+        """True motion of the waist at integer-nanosecond stamps (n,); motionless before the start and after the end.
+
+        A pure function of the stamps; how they are cut into blocks changes results by rounding only.
+        """
         t_s = (stamp_ns - self.start_ns) / NS_PER_S
         t = np.clip(t_s, self._strike_s[0], self._strike_s[-1])
         path = self._path(t)
@@ -162,8 +166,8 @@ def _gains(person: Person, effort_m_s: Array, rng: np.random.Generator) -> Array
     return gains
 
 
-def _irregular(
-    rng: np.random.Generator, peak_hz: float, deviation: tuple[float, ...], strike_s: Array, activity: Array
-) -> IrregularMotion:
+def _irregular(rng: np.random.Generator, peak_hz: float, strike_s: Array, deviation: Array) -> IrregularMotion:
+    """Irregular motion whose deviation (n, 6) is given at the strikes."""
     instants = control_instants_s(peak_hz, float(strike_s[-1]))
-    return IrregularMotion(rng, peak_hz, np.array(deviation), np.interp(instants, strike_s, activity))
+    at_controls = [np.interp(instants, strike_s, column) for column in deviation.T]
+    return IrregularMotion(rng, peak_hz, np.stack(at_controls, axis=1))

@@ -98,7 +98,7 @@ def test_a_drawn_person_limps_a_little():
 def test_irregular_motion_has_the_stated_deviation_and_rests_where_nothing_moves():
     instants = control_instants_s(7.0, 400.0)
     deviation = np.array([0.5, 0.4, 0.3, 0.1, 0.2, 0.15])
-    motion = IrregularMotion(np.random.default_rng(6), 7.0, deviation, (instants < 200.0).astype(float))
+    motion = IrregularMotion(np.random.default_rng(6), 7.0, np.outer(instants < 200.0, deviation))
     moving, still = (motion.at(np.arange(a, a + 190.0, 0.01)) for a in (5.0, 205.0))
     measured = np.r_[moving.acceleration.std(axis=0)[:3], moving.rate.std(axis=0)[3:]]
     np.testing.assert_allclose(measured, deviation, rtol=0.05)
