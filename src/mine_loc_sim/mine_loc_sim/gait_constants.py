@@ -18,7 +18,8 @@ WAIST_SHARE_OF_HEIGHT = 0.58  # assumed: fifth lumbar vertebra
 MAX_SPEED_M_S = 2.5  # assumed: people run above
 
 # Steps.
-MIN_STEP_FREQUENCY_HZ = 1.3  # assumed: slower walking has shorter steps, not slower ones
+# assumed: slower walking has shorter steps, not slower ones; mobgap_lowerback's people make 1.2–1.6 Hz at 0.25–0.5 m/s
+MIN_STEP_FREQUENCY_HZ = 1.3
 STEP_TIME_CV = 0.024  # measured 0.027, less the 0.010 s grid of its marks
 STEP_LENGTH_CV = 0.03  # assumed: scatter about the law
 STEP_TIME_ASYMMETRY_SD = 0.035  # measured: |left − right| / mean, median 0.03

@@ -64,3 +64,8 @@ STEEL_SD_SHARE = 0.6  # assumed: deviation of each component over Earth's field
 STEEL_LENGTH_M = 2.0  # assumed: correlation length along a gallery
 STEEL_WAVES = 24  # of the random field
 FIELD_LIMIT_SHARE = 2.8  # captured: 1406 mG, 2.8 times Earth's field
+
+# The device's own attitude filter, without magnetometer.
+AHRS_TILT_SD_RAD, AHRS_TILT_S = 0.7 * DEG, 8.0  # assumed: class of low-cost filters while walking, correlation time
+AHRS_DRIFT_SD_RAD_S = 20 * DEG / 3600  # assumed: bias left over by the filter
+AHRS_HEADING_WALK = 0.012 * DEG  # class: gyro noise, rad/√s
