@@ -21,7 +21,10 @@ _VELOCITY_FADE_S = 3.0
 _WALKING_SD_MS = 1.0  # prior of a person's velocity
 _YAW_DRIFT_SD = math.radians(0.5)  # per square root of a second
 _STEP_VELOCITY_SD_MS = 0.25  # the waist's speed varies within a step
-_MIN_POSITION_SD_M = 0.05  # ranges of one place share a bias that averaging does not remove (hardware.md D.1)
+_MIN_POSITION_SD_M = 0.05
+_SHARED_BIAS_SD_M = (
+    0.1  # ranges of one place share a bias that averaging does not remove: the least of several data sets
+)
 _YAW_BASELINE_M = 3.0
 _MAX_PREDICTION_S = 600.0
 
@@ -59,9 +62,9 @@ class PoseFilter:
         since_uwb_s = math.inf if self._uwb_ns is None else to_s(max(0, stamp_ns - self._uwb_ns))
         since_step_s = math.inf if self._step_ns is None else to_s(max(0, stamp_ns - self._step_ns))
         yaw = float(x[4]) if self._yaw_known else None
-        return Estimate(
-            stamp_ns, x[:2], x[2:4], P[:4, :4], self._mode(P, since_uwb_s, since_step_s), yaw, since_uwb_s, since_step_s
-        )
+        covariance = P[:4, :4] + np.diag([_SHARED_BIAS_SD_M**2, _SHARED_BIAS_SD_M**2, 0.0, 0.0])
+        mode = self._mode(covariance, since_uwb_s, since_step_s)
+        return Estimate(stamp_ns, x[:2], x[2:4], covariance, mode, yaw, since_uwb_s, since_step_s)
 
     def save(self) -> dict[str, object]:
         """See Estimator."""
