@@ -46,6 +46,7 @@ _RECORDINGS: dict[str, Callable[[], Recording]] = {
 }
 _START_DEADLINE_S = 30.0
 _DRAW_PERIOD_S = 0.25
+_READY_PERIOD_S = 0.05
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -117,15 +118,18 @@ class _Demo:
         self._events.append((time.monotonic(), event))
 
     async def _until_ready(self, nodes: int, interrupted: asyncio.Event) -> bool:
-        """Wait until every node reports, because bytes sent to a port that nobody has opened are lost."""
+        """Wait until every node has reported twice, which leaves them a second to find each other.
+
+        Bytes sent to a port that nobody has opened are lost.
+        """
         deadline_s = time.monotonic() + _START_DEADLINE_S
-        reporting: set[str] = set()
+        ready: list[str] = []
         while time.monotonic() < deadline_s and not interrupted.is_set():
-            await asyncio.sleep(0.05)
-            reporting = {name.split(":")[0] for name in list(self._watch.watched.diagnostics)}
-            if len(reporting) >= nodes:
+            await asyncio.sleep(_READY_PERIOD_S)
+            ready = sorted(name for name, count in list(self._watch.watched.reports.items()) if count > 1)
+            if len(ready) >= nodes:
                 return True
-        print(f"only {sorted(reporting)} of {nodes} nodes report; see {self._out / 'nodes.log'}", file=sys.stderr)
+        print(f"only {ready} of {nodes} nodes report; see {self._out / 'nodes.log'}", file=sys.stderr)
         return False
 
     async def _play(self, interrupted: asyncio.Event) -> None:

@@ -44,7 +44,8 @@ class Watched:
 
     outputs: dict[str, list[Output]] = field(default_factory=lambda: defaultdict(list))
     rounds: Counter[int] = field(default_factory=Counter)
-    diagnostics: dict[str, tuple[int, str]] = field(default_factory=dict)
+    reports: Counter[str] = field(default_factory=Counter)
+    """Diagnostics received of each node."""
     arrivals: dict[str, deque[float]] = field(default_factory=lambda: defaultdict(lambda: deque(maxlen=1000)))
 
     def rate_hz(self, topic: str) -> float:
@@ -114,8 +115,7 @@ class DemoWatch:
         self.watched.rounds[array.tag_id] += 1
 
     def _on_diagnostics(self, array: DiagnosticArray, received_ns: int) -> None:  # noqa: ARG002
-        for status in array.status:
-            self.watched.diagnostics[status.name] = (status.level[0], status.message)
+        self.watched.reports.update({status.name.split(":")[0] for status in array.status})
 
 
 _TOPICS = [
