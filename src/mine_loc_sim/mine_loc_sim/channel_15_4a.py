@@ -46,10 +46,6 @@ def power_delay_profile(parameters: ChannelParameters, count: int, rng: np.rando
         soft = _soft_onset(parameters, delay_ns)
         return np.broadcast_to(soft / soft.sum(), (count, bins)).copy(), m
     power = _clusters(parameters, delay_ns, m, rng)
-    if parameters.ray_rate_per_ns > 0.0:
-        present = rng.random((count, bins), np.float32) < -np.expm1(-parameters.ray_rate_per_ns * BIN_NS)
-        present[:, 0] = True
-        power *= present
     return (power / power.sum(axis=1, keepdims=True)).astype(np.float32), m
 
 

@@ -14,7 +14,7 @@ from mine_loc_sim.channel_15_4a import (
     power_delay_profile,
     without_clusters,
 )
-from mine_loc_sim.radio_constants import CM3, CM4, CM7, CM8
+from mine_loc_sim.radio_constants import CM4, CM7, CM8
 
 DRAWS = 1000
 
@@ -59,7 +59,7 @@ def test_cm8_mean_power_peaks_9_metres_after_the_direct_path():
     assert power[0].argmax() * BIN_NS == pytest.approx(30.85, abs=BIN_NS)
 
 
-@pytest.mark.parametrize("parameters", [CM3, CM4, CM7, CM8, without_clusters(CM7)])
+@pytest.mark.parametrize("parameters", [CM4, CM7, CM8, without_clusters(CM7)])
 def test_responses_have_unit_energy_and_repeat_with_the_seed(parameters):
     taps = draw_responses(parameters, 5, np.random.default_rng(3))
     np.testing.assert_allclose((np.abs(taps) ** 2).sum(axis=1), 1.0, rtol=1e-5)
