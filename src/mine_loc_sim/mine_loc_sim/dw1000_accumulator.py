@@ -75,6 +75,11 @@ def _raised_cosine(length: int) -> NDArray[np.float32]:
     return np.asarray(gain, np.float32)
 
 
+def pulse_peak() -> float:
+    """Peak of a lone path of energy 1: raised cosine of roll-off 1 has energy 3/4 of its period."""
+    return float(1.0 / np.sqrt(0.75 * constants.PULSE_PERIOD_TAPS))
+
+
 def accumulate(
     taps: Taps,
     level_dbm: NDArray[np.float64],

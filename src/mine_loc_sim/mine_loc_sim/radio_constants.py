@@ -123,6 +123,9 @@ FADING_LENGTH_M = CARRIER_WAVELENGTH_M / 2.0
 """Way over which a bin's fading is redrawn: first null of the field correlation is near 0.4 wavelengths (Clarke)."""
 ANCHOR_OFFSET_SD_M = 0.03
 """Left over after each anchor's antenna delay is calibrated: assumed."""
+CLOCK_JITTER_SD_M = 0.015
+"""Timestamps of a range besides the leading edge (clock noise over the reply times): assumed, so small that D.1's white
+noise of 0.014 to 0.028 m on a fixed link holds both."""
 CRYSTAL_OFFSET_SD_PPM = 5.0
 """DWM1000 crystals are trimmed to a few ppm; limit of the standard is 20: assumed."""
 CRYSTAL_WANDER_PPM_PER_ROOT_S = 0.01
@@ -161,3 +164,21 @@ FURTHER_CORNER_LOSS_DB = 20.0
 """Each corner beyond the first, which CM8's own loss stands for: assumed."""
 OPAQUE_DB = 80.0
 """Beyond this a through path cannot be received with any link budget here: transmit power to sensitivity."""
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """Channels of one kind of place: seen directly, and what arrives round obstacles."""
+
+    clear: ChannelParameters
+    scattered: ChannelParameters
+
+
+INDUSTRIAL = Environment(CM7, CM8)
+"""Mines, halls: the channels of paper D."""
+OFFICE = Environment(CM7, CM4)
+"""Buildings. CM7 stays for clear links: its share beyond RX-FP 6 dB is D.2's, that of office LOS (CM3) is twice D.2's."""
+OBSTRUCTED_LOSS_DB = 3.0
+"""Link class 2 begins here: half the power, assumed."""
+CLEAR_ERROR_M = 0.09
+"""Link class 3 ends here: three times the white noise of D.1."""
