@@ -16,8 +16,8 @@ Taps = NDArray[np.complex64]
 
 TAP_NS = 1e3 / (2.0 * 499.2)
 """DW1000 accumulator tap, 1.0016 ns (DW1000 User Manual 7.2.38)."""
-FINE_PER_TAP = 6
-"""Delay bins per tap: 1/6 ns, the resolution of the 7.5 GHz wide soundings behind CM7 and CM8."""
+FINE_PER_TAP = 3
+"""Delay bins per tap, 1/3 ns: six per pulse; the receiver places them between taps without a grid."""
 BIN_NS = TAP_NS / FINE_PER_TAP
 _LEAST_NAKAGAMI_M = 0.5
 

@@ -51,20 +51,21 @@ class Receiver:
         return Receiver(thermal, own)
 
 
-def shape_pulse(taps: Taps, shift_taps: NDArray[np.float64]) -> Taps:
-    """Band-limit responses to the 499.2 MHz pulse and sample them once a tap, delay 0 at `_GUARD_TAPS + shift_taps`.
-
-    taps: (n, bins); shift_taps: (n,), 0..1. Returns (n, taps), up to a common factor.
-    """
+def band_limit(taps: Taps) -> Taps:
+    """Spectrum of responses (n, bins) behind the pulse, over the band of one sample a tap: (n, length)."""
     length = scipy.fft.next_fast_len(-(-taps.shape[1] // FINE_PER_TAP) + 2 * _GUARD_TAPS)
     spectrum = scipy.fft.fft(taps, length * FINE_PER_TAP, axis=1)
     half = length // 2
     low = np.concatenate([spectrum[:, : length - half], spectrum[:, -half:]], axis=1)
-    frequency = scipy.fft.fftfreq(length)
-    delay = np.exp(-2j * np.pi * frequency * (_GUARD_TAPS + shift_taps[:, None])).astype(np.complex64)
-    low *= delay
     low *= _raised_cosine(length)
-    return np.asarray(scipy.fft.ifft(low, axis=1), np.complex64)
+    return np.asarray(low)
+
+
+def _sample(spectrum: Taps, shift_taps: NDArray[np.float64]) -> Taps:
+    """Once a tap, delay 0 at `_GUARD_TAPS + shift_taps`; shift_taps: (n,), 0..1. Returns (n, length)."""
+    turn = (-2j * np.pi * scipy.fft.fftfreq(spectrum.shape[1])).astype(np.complex64)
+    delayed = spectrum * np.exp(turn * (_GUARD_TAPS + shift_taps[:, None]).astype(np.float32))
+    return np.asarray(scipy.fft.ifft(delayed, axis=1, overwrite_x=True), np.complex64)
 
 
 @cache
@@ -81,17 +82,21 @@ def pulse_peak() -> float:
 
 
 def accumulate(
-    taps: Taps,
+    spectrum: Taps,
+    peak_delay_taps: NDArray[np.float64],
     level_dbm: NDArray[np.float64],
     receiver: Receiver,
     rng: np.random.Generator,
     full_count: int = constants.PREAMBLE_COUNT_1024,
 ) -> Reception:
-    """Receive `n` responses of shape (n, bins), scaled so that each arrives with the true level `level_dbm` (n,)."""
-    peak_delay = np.abs(taps).argmax(axis=1) / FINE_PER_TAP
-    position = rng.uniform(*constants.FIRST_PATH_TAPS, len(taps)) - constants.PEAK_PULL * peak_delay
+    """Receive `n` responses with spectra as `band_limit` gives them, each scaled to its true level (n,).
+
+    peak_delay_taps: delay of the strongest path (n,), which pulls the window.
+    """
+    count = len(spectrum)
+    position = rng.uniform(*constants.FIRST_PATH_TAPS, count) - constants.PEAK_PULL * peak_delay_taps
     whole = np.floor(position).astype(int)
-    signal = shape_pulse(taps, position - whole)
+    signal = _sample(spectrum, position - whole)
     amplitude = 10.0 ** (0.05 * (reported_level_dbm(level_dbm) + constants.POWER_CONSTANT_DB))
     signal *= (amplitude / np.linalg.norm(signal, axis=1)).astype(np.float32)[:, None]
     strongest = np.maximum(np.abs(signal.real).max(axis=1), np.abs(signal.imag).max(axis=1))
@@ -100,7 +105,7 @@ def accumulate(
         np.hypot(receiver.thermal_counts * np.sqrt(symbols), receiver.self_noise * amplitude * symbols), rng
     )
     index = (whole[:, None] - _GUARD_TAPS + np.arange(signal.shape[1])) % constants.ACCUMULATOR_TAPS
-    samples[np.arange(len(taps))[:, None], index] += signal * symbols.astype(np.float32)[:, None]
+    samples[np.arange(count)[:, None], index] += signal * symbols.astype(np.float32)[:, None]
     np.rint(samples.view(np.float32), out=samples.view(np.float32))
     return Reception(samples, symbols, symbols < full_count, position, full_count)
 

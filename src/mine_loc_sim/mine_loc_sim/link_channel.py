@@ -110,11 +110,26 @@ class LinkChannel:
 
 
 def _past_obstacle(direct: Taps, way: Obstruction) -> Taps:
-    """What is left of clear responses (k, bins): weakened and late before the way round, whole after it."""
-    early = np.arange(direct.shape[1]) < np.maximum(_bins(way.detour_m), FINE_PER_TAP)[:, None]
-    through = np.where(early, direct, 0) * _root_mw(-way.loss_db)
-    passing = np.where(early | way.sealed[:, None], 0, direct)
-    return _delayed(through[:, :-_LONGEST_DETOUR_BINS], _bins(way.delay_m), direct.shape[1]) + passing
+    """What is left of clear responses (k, bins): through the obstacle, over its edge, and past it.
+
+    Waves of excess way s leave the straight way by less than an ellipse with semi-minor axis ~ sqrt(s); an obstacle
+    round which the way is longer by D hides those with s < D wholly, of the others the share 2/pi asin sqrt(D/s).
+    """
+    round_bins = np.maximum(_bins(way.detour_m), FINE_PER_TAP)[:, None]
+    age = np.maximum(np.arange(direct.shape[1]), round_bins)
+    seen = np.sqrt(1.0 - np.arcsin(np.sqrt(round_bins / age)) * (2.0 / np.pi)) * ~way.sealed[:, None]
+    early = np.where(np.arange(direct.shape[1]) < round_bins, direct, 0)[:, :-_LONGEST_DETOUR_BINS]
+    past = direct * seen.astype(np.float32)
+    past += _delayed(early * _root_mw(-way.loss_db), _bins(way.delay_m), direct.shape[1])
+    edge_db = np.where(way.sealed | (way.detour_m <= 0.0), 300.0, knife_edge_loss_db(way.detour_m))
+    past += _delayed(early[:, :FINE_PER_TAP] * _root_mw(-edge_db), _bins(way.detour_m), direct.shape[1])
+    return past
+
+
+def knife_edge_loss_db(detour_m: Reals) -> Reals:
+    """Diffraction over one edge by excess way (ITU-R P.526, eq. 31: nu = 2 sqrt(detour / wavelength))."""
+    nu = 2.0 * np.sqrt(np.where(np.isfinite(detour_m), detour_m, 1e6) / constants.CARRIER_WAVELENGTH_M) - 0.1
+    return np.asarray(6.9 + 20.0 * np.log10(np.sqrt(nu**2 + 1.0) + nu))
 
 
 def select(way: Obstruction, which: Indices) -> Obstruction:
@@ -122,7 +137,7 @@ def select(way: Obstruction, which: Indices) -> Obstruction:
     return Obstruction(*(getattr(way, field.name)[which] for field in fields(way)))
 
 
-_LONGEST_DETOUR_BINS = 600
+_LONGEST_DETOUR_BINS = 300
 """30 m: energy that comes later still is put there; it is past the accumulator's first-path search in any case."""
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mine_loc_sim import radio_constants as constants
 from mine_loc_sim.channel_15_4a import FINE_PER_TAP
-from mine_loc_sim.dw1000_accumulator import Receiver, accumulate, taps_to_m
+from mine_loc_sim.dw1000_accumulator import Receiver, accumulate, band_limit, taps_to_m
 from mine_loc_sim.leading_edge import read_registers
 
 _PHASES = 512
@@ -27,6 +27,6 @@ def edge_lead_m() -> float:
     taps[:, 0] = 1.0
     receiver = Receiver(np.full(_PHASES, constants.NOISE_PER_SYMBOL_COUNTS), np.zeros(_PHASES))
     level_dbm = np.full(_PHASES, _CALIBRATION_LEVEL_DBM)
-    reception = accumulate(taps, level_dbm, receiver, np.random.default_rng(0))
+    reception = accumulate(band_limit(taps), np.zeros(_PHASES), level_dbm, receiver, np.random.default_rng(0))
     found = read_registers(reception).first_path_index
     return float(np.median(taps_to_m(reception.direct_index - found)))

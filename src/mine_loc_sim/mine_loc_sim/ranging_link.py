@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mine_loc_sim import radio_constants as constants
-from mine_loc_sim.dw1000_accumulator import Receiver, Reception, accumulate, pulse_peak, reported_level_dbm, taps_to_m
+from mine_loc_sim.channel_15_4a import FINE_PER_TAP
+from mine_loc_sim.dw1000_accumulator import Receiver, Reception, accumulate, band_limit, pulse_peak, reported_level_dbm, taps_to_m
 from mine_loc_sim.leading_edge import ReceiveRegisters, read_registers
 from mine_loc_sim.link_channel import LinkChannel, Obstruction, ResponseBatch
 from mine_loc_sim.mine import LinkGeometry
@@ -77,8 +78,10 @@ def exchange(
     befalls the anchor's end, so the registers at the tag do not show it.
     """
     count = len(loss_db)
-    at_tag = accumulate(batch.taps, batch.level_dbm, tag, rng)
-    at_anchor = accumulate(batch.taps, batch.level_dbm, anchor, rng)
+    spectrum = band_limit(batch.taps)
+    peak_delay_taps = np.abs(batch.taps).argmax(axis=1) / FINE_PER_TAP
+    at_tag = accumulate(spectrum, peak_delay_taps, batch.level_dbm, tag, rng)
+    at_anchor = accumulate(spectrum, peak_delay_taps, batch.level_dbm, anchor, rng)
     registers = read_registers(at_tag)
     tag_m = taps_to_m(registers.first_path_index - at_tag.direct_index)
     anchor_m = taps_to_m(read_registers(at_anchor).first_path_index - at_anchor.direct_index)
