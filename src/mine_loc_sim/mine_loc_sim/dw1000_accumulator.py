@@ -87,6 +87,7 @@ def accumulate(
     level_dbm: NDArray[np.float64],
     receiver: Receiver,
     rng: np.random.Generator,
+    *,
     full_count: int = constants.PREAMBLE_COUNT_1024,
 ) -> Reception:
     """Receive `n` responses with spectra as `band_limit` gives them, each scaled to its true level (n,).

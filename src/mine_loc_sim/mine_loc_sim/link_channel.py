@@ -118,7 +118,7 @@ def _past_obstacle(direct: Taps, way: Obstruction) -> Taps:
     round_bins = np.maximum(_bins(way.detour_m), FINE_PER_TAP)[:, None]
     age = np.maximum(np.arange(direct.shape[1]), round_bins)
     seen = np.sqrt(1.0 - np.arcsin(np.sqrt(round_bins / age)) * (2.0 / np.pi)) * ~way.sealed[:, None]
-    early = np.where(np.arange(direct.shape[1]) < round_bins, direct, 0)[:, :-_LONGEST_DETOUR_BINS]
+    early = (direct * (np.arange(direct.shape[1]) < round_bins))[:, :-_LONGEST_DETOUR_BINS]
     past = direct * seen.astype(np.float32)
     past += _delayed(early * _root_mw(-way.loss_db), _bins(way.delay_m), direct.shape[1])
     edge_db = np.where(way.sealed | (way.detour_m <= 0.0), 300.0, knife_edge_loss_db(way.detour_m))

@@ -22,7 +22,7 @@ def level_bias_m(level_dbm: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @cache
 def edge_lead_m() -> float:
-    """How far before the centre of a lone path its half-height edge is found: what antenna delay calibration removes."""
+    """How far before a lone path's centre its half-height edge is found: what antenna delay calibration removes."""
     taps = np.zeros((_PHASES, FINE_PER_TAP), np.complex64)
     taps[:, 0] = 1.0
     receiver = Receiver(np.full(_PHASES, constants.NOISE_PER_SYMBOL_COUNTS), np.zeros(_PHASES))

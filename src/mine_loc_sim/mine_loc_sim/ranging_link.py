@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from mine_loc_sim import radio_constants as constants
 from mine_loc_sim.channel_15_4a import FINE_PER_TAP
-from mine_loc_sim.dw1000_accumulator import Receiver, Reception, accumulate, band_limit, pulse_peak, reported_level_dbm, taps_to_m
+from mine_loc_sim.dw1000_accumulator import (
+    Receiver,
+    Reception,
+    accumulate,
+    band_limit,
+    pulse_peak,
+    reported_level_dbm,
+    taps_to_m,
+)
 from mine_loc_sim.leading_edge import ReceiveRegisters, read_registers
 from mine_loc_sim.link_channel import LinkChannel, Obstruction, ResponseBatch
 from mine_loc_sim.mine import LinkGeometry
@@ -61,12 +69,15 @@ class Exchanges:
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """One ranging round over `n` links; all arrays (n,)."""
+    """Ranges over `n` links; all arrays (n,)."""
 
     received: NDArray[np.bool_]
     range_m: Reals  # as the radio reports it, bias by level included; NaN = lost
     level_bias_m: Reals  # the part of it that APS011 knows
-    exchanges: Exchanges
+    link_class: NDArray[np.int64]  # truth, LinkClass
+    receive_power_dbm: Reals
+    first_path_power_dbm: Reals
+    exchanges: Exchanges | None  # with accumulators; None from `range_law.py`
 
 
 def exchange(
@@ -74,8 +85,7 @@ def exchange(
 ) -> Exchanges:
     """Receive `n` responses at both ends and time them.
 
-    The range's error is the mean of both ends', since each carries half of a symmetric exchange. An early false path
-    befalls the anchor's end, so the registers at the tag do not show it.
+    The range's error is the mean of both ends', since each carries half of a symmetric exchange.
     """
     count = len(loss_db)
     spectrum = band_limit(batch.taps)
@@ -85,13 +95,19 @@ def exchange(
     registers = read_registers(at_tag)
     tag_m = taps_to_m(registers.first_path_index - at_tag.direct_index)
     anchor_m = taps_to_m(read_registers(at_anchor).first_path_index - at_anchor.direct_index)
-    false_path = rng.random(count) < constants.EARLY_FALSE_PATH_PROBABILITY
-    anchor_m -= np.where(false_path, rng.exponential(constants.EARLY_FALSE_PATH_MEAN_M, count), 0.0)
     error_m = 0.5 * (tag_m + anchor_m) + edge_lead_m() + constants.CLOCK_JITTER_SD_M * rng.standard_normal(count)
     margin = (batch.level_dbm - constants.SENSITIVITY_DBM) / constants.SENSITIVITY_SOFTNESS_DB
     lost = rng.random(count) > 1.0 / (1.0 + np.exp(-np.clip(margin, -50.0, 50.0)))
     error_m[lost] = np.nan
-    return Exchanges(error_m, _classify(batch, loss_db, at_tag, registers, tag_m + edge_lead_m()), batch.level_dbm, registers, at_tag)
+    return Exchanges(
+        error_m, _classify(batch, loss_db, at_tag, registers, tag_m + edge_lead_m()), batch.level_dbm, registers, at_tag
+    )
+
+
+def early_false_paths_m(count: int, rng: np.random.Generator) -> Reals:
+    """How much too short isolated ranges are, mostly 0: noise taken for a path at the anchor, unseen at the tag."""
+    false_path = rng.random(count) < constants.EARLY_FALSE_PATH_PROBABILITY
+    return np.where(false_path, rng.exponential(constants.EARLY_FALSE_PATH_MEAN_M, count), 0.0)
 
 
 def _classify(
@@ -133,10 +149,14 @@ class TagLinks:
         body = self._wearer.shadow(bearing - facing_rad, self._body.advance(which, moved_m))
         way = obstruction(ways, *body)
         batch = self._channel.respond(which, moved_m, way)
-        exchanges = exchange(batch, way.loss_db, _pick(self._tag, which * 0), _pick(self._anchors, which), self._rng)
+        found = exchange(batch, way.loss_db, _pick(self._tag, which * 0), _pick(self._anchors, which), self._rng)
         slow_m = constants.SLOW_BIAS_SD_M * self._bias.advance(which, moved_m)
         slow_m += self._anchors.offset_m[which] + self._tag.offset_m[0]
-        return with_biases(way.distance_m, slow_m, exchanges)
+        by_level_m = level_bias_m(found.level_dbm)
+        false_m = early_false_paths_m(len(which), self._rng)
+        range_m = way.distance_m + slow_m + by_level_m + found.error_m - false_m
+        powers = found.registers.receive_power_dbm, found.registers.first_path_power_dbm
+        return Ranges(np.isfinite(range_m), range_m, by_level_m, found.link_class, *powers, found)
 
     def _moved(self, tag_m: Reals, anchor_m: Reals, which: Indices) -> Reals:
         """Way of both ends [m] since the link was last used."""
@@ -157,13 +177,6 @@ def obstruction(ways: LinkGeometry, body_loss_db: Reals, body_delay_m: Reals) ->
         further_loss_db=constants.FURTHER_CORNER_LOSS_DB * np.maximum(ways.corners - 1, 0),
         sealed=ways.rock_m > 0.0,
     )
-
-
-def with_biases(distance_m: Reals, slow_m: Reals, exchanges: Exchanges) -> Ranges:
-    """Add what is not detection: slow bias of link and radios, bias by level."""
-    by_level_m = level_bias_m(exchanges.level_dbm)
-    range_m = distance_m + slow_m + by_level_m + exchanges.error_m
-    return Ranges(np.isfinite(range_m), range_m, by_level_m, exchanges)
 
 
 def _pick(radios: Radios, which: Indices) -> Receiver:
