@@ -22,8 +22,8 @@ from mine_loc_sim.channel_15_4a import (
     path_loss_db,
     power_delay_profile,
 )
+from mine_loc_sim.gauss_markov import GaussMarkov
 from mine_loc_sim.radio_constants import ChannelParameters, Environment
-from mine_loc_sim.spatial_process import SpatialProcess
 
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -58,7 +58,7 @@ class FadingChannel:
         self._rng = rng
         self._power, self._m = power_delay_profile(parameters, count, rng)
         self._taps = fade(self._power, self._m, rng)
-        self._shadowing = SpatialProcess(count, constants.SHADOWING_LENGTH_M, rng)
+        self._shadowing = GaussMarkov(count, constants.SHADOWING_LENGTH_M, rng)
 
     def advance(self, which: Indices, moved_m: Reals) -> tuple[Taps, Reals]:
         """Move links `which` (k,); returns responses of energy 1 (k, bins) and their shadowing [dB] (k,)."""

@@ -178,8 +178,8 @@ class Environment:
 INDUSTRIAL = Environment(CM7, CM8)
 """Mines, halls: the channels of paper D."""
 OFFICE = Environment(CM7, CM4)
-"""Buildings. CM7 stays for clear links: its share beyond RX-FP 6 dB is that of real LOS links (D.2, 15 to 27 %), whereas
-office LOS (CM3) puts half of them there."""
+"""Buildings. CM7 stays for clear links: as many of them as of real ones (D.2, 15 to 27 %) have RX-FP above 6 dB, of
+office LOS (CM3) half."""
 OBSTRUCTED_LOSS_DB = 3.0
 """Link class 2 begins here: half the power, assumed."""
 CLEAR_ERROR_M = 0.09

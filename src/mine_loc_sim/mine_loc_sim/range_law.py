@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from mine_loc_sim import radio_constants as constants
+from mine_loc_sim.gauss_markov import GaussMarkov
 from mine_loc_sim.link_channel import LinkChannel, Obstruction
 from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.radio_constants import Environment
@@ -29,7 +30,6 @@ from mine_loc_sim.ranging_link import (
     exchange,
     obstruction,
 )
-from mine_loc_sim.spatial_process import SpatialProcess
 from mine_loc_sim.wearer import Wearer, body_process
 
 _DISTANCE_M = np.array([1.0, 2.5, 6.0, 15.0, 35.0, 80.0])
@@ -143,10 +143,10 @@ class FastTagLinks:
         count = len(anchors.offset_m)
         self._law = range_law(environment)
         self._offset_m, self._wearer, self._rng = anchors.offset_m + tag.offset_m[0], wearer, rng
-        self._bias = SpatialProcess(count, constants.SLOW_BIAS_LENGTH_M, rng)
+        self._bias = GaussMarkov(count, constants.SLOW_BIAS_LENGTH_M, rng)
         self._body = body_process(count, rng)
-        self._slow = SpatialProcess(count, constants.CLUSTER_LENGTH_M, rng)
-        self._quick = SpatialProcess(count, constants.FADING_LENGTH_M, rng)
+        self._slow = GaussMarkov(count, constants.CLUSTER_LENGTH_M, rng)
+        self._quick = GaussMarkov(count, constants.FADING_LENGTH_M, rng)
         self._last_m = np.full((count, 6), 1e3)
 
     def measure(self, tag_m: Reals, facing_rad: Reals, anchor_m: Reals, which: Indices, ways: LinkGeometry) -> Ranges:

@@ -21,12 +21,12 @@ from mine_loc_sim.dw1000_accumulator import (
     reported_level_dbm,
     taps_to_m,
 )
+from mine_loc_sim.gauss_markov import GaussMarkov
 from mine_loc_sim.leading_edge import ReceiveRegisters, read_registers
 from mine_loc_sim.link_channel import LinkChannel, Obstruction, ResponseBatch
 from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.radio_constants import Environment
 from mine_loc_sim.range_bias import edge_lead_m, level_bias_m
-from mine_loc_sim.spatial_process import SpatialProcess
 from mine_loc_sim.wearer import Wearer, body_process
 
 Reals = NDArray[np.float64]
@@ -134,7 +134,7 @@ class TagLinks:
         count = len(anchors.offset_m)
         self._tag, self._anchors, self._wearer, self._rng = tag, anchors, wearer, rng
         self._channel = LinkChannel(environment, count, rng)
-        self._bias = SpatialProcess(count, constants.SLOW_BIAS_LENGTH_M, rng)
+        self._bias = GaussMarkov(count, constants.SLOW_BIAS_LENGTH_M, rng)
         self._body = body_process(count, rng)
         self._last_m = np.full((count, 6), np.nan)
 

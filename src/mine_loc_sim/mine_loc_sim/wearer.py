@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mine_loc_sim import radio_constants as constants
-from mine_loc_sim.spatial_process import SpatialProcess
+from mine_loc_sim.gauss_markov import GaussMarkov
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,6 @@ class Wearer:
         return self.loss_db * behind, np.maximum(0.0, self.delay_m + constants.BODY_DELAY_SD_M * variation) * behind
 
 
-def body_process(count: int, rng: np.random.Generator) -> SpatialProcess:
+def body_process(count: int, rng: np.random.Generator) -> GaussMarkov:
     """Variation of the excess way from place to place for `count` links."""
-    return SpatialProcess(count, constants.SLOW_BIAS_LENGTH_M, rng)
+    return GaussMarkov(count, constants.SLOW_BIAS_LENGTH_M, rng)
