@@ -22,7 +22,7 @@ from mine_loc_sim.mine import Mine
 from mine_loc_sim.prism import contains
 from mine_loc_sim.radio_constants import CM7, CM8, INDUSTRIAL, OFFICE, Environment
 from mine_loc_sim.range_law import FastTagLinks, range_law
-from mine_loc_sim.ranging_link import LinkClass, Radios, TagLinks
+from mine_loc_sim.ranging_link import LinkClass, Radios, Ranges, TagLinks
 from mine_loc_sim.site_mine import mine_of
 from mine_loc_sim.wearer import Wearer
 
@@ -43,8 +43,11 @@ class Survey:
     first_rounds: Receptions
 
 
-def survey(mine: Mine, anchors_m: NDArray[np.float64], environment: Environment, seed: int) -> Survey:
+def survey(name: str, environment: Environment, seed: int) -> Survey:
     """Put tags at random free places and range each anchor some times with CIR."""
+    site = load_site(HERE / "sim_scenes" / name)
+    mine, anchors_m = mine_of(site), np.array([anchor.position_m for anchor in site.anchors])
+    size_m = np.max(site.chambers[0].polygon_m, axis=0)
     seeds = np.random.SeedSequence(seed).spawn(TAGS + 1)
     rng = np.random.default_rng(seeds[0])
     radios = Radios.draw(len(anchors_m), rng)
@@ -52,39 +55,43 @@ def survey(mine: Mine, anchors_m: NDArray[np.float64], environment: Environment,
     which = np.arange(len(anchors_m))
     for tag_seed in seeds[1:]:
         tag_rng = np.random.default_rng(tag_seed)
-        tag_m = free_place(mine, tag_rng)
-        ways = mine.look(np.repeat(tag_m[None], len(which), axis=0), anchors_m)
+        tag_m = free_place(mine, size_m, tag_rng)
+        count = ROUNDS * len(which)
+        ways = mine.look(np.repeat(tag_m[None], count, axis=0), np.tile(anchors_m, (ROUNDS, 1)))
         links = TagLinks(environment, Radios.draw(1, tag_rng), radios, TRIPOD, tag_rng)
-        rounds = [links.measure(tag_m, 0.0, anchors_m, which, ways) for _ in range(ROUNDS)]
-        errors.append(np.stack([ranges.range_m - ways.distance_m for ranges in rounds], axis=1))
-        gaps.append(np.stack([r.receive_power_dbm - r.first_path_power_dbm for r in rounds], axis=1))
-        blocked.append(~ways.clear)
-        found = rounds[0].exchanges
-        assert found is not None
-        registers = found.registers
-        heard = rounds[0].received
-        vectors.append(
-            features(
-                np.abs(found.reception.samples[heard]),
-                registers.first_path_index[heard],
-                found.reception.symbols[heard],
-                registers.receive_power_dbm[heard],
-                registers.first_path_power_dbm[heard],
-            )
-        )
-        classes.append(rounds[0].link_class[heard])
+        still = np.repeat(tag_m[None], ROUNDS, axis=0), np.zeros(ROUNDS), np.tile(anchors_m, (ROUNDS, 1, 1))
+        ranges = links.measure(*still, np.tile(which, (ROUNDS, 1)), ways)
+        gap_db = ranges.receive_power_dbm - ranges.first_path_power_dbm
+        errors.append((ranges.range_m - ways.distance_m).reshape(ROUNDS, -1).T)
+        gaps.append(gap_db.reshape(ROUNDS, -1).T)
+        blocked.append(~ways.clear[: len(which)])
+        heard = np.flatnonzero(ranges.received[: len(which)])
+        vectors.append(first_features(ranges, heard))
+        classes.append(ranges.link_class[heard])
     obstructed = np.concatenate(classes) <= LinkClass.OBSTRUCTED
     receptions = Receptions(np.concatenate(vectors), obstructed, np.zeros(len(obstructed), int))
     return Survey(np.concatenate(errors), np.concatenate(gaps), np.concatenate(blocked), receptions)
 
 
-def free_place(mine: Mine, rng: np.random.Generator, margin_m: float = 0.5) -> NDArray[np.float64]:
-    """Draw a place in the first room, clear of obstacles."""
-    room = mine.free[0].polygon_m
+def first_features(ranges: Ranges, which: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Features of some receptions."""
+    found = ranges.exchanges
+    assert found is not None
+    return features(
+        np.abs(found.reception.samples[which]),
+        found.registers.first_path_index[which],
+        found.reception.symbols[which],
+        ranges.receive_power_dbm[which],
+        ranges.first_path_power_dbm[which],
+    )
+
+
+def free_place(mine: Mine, size_m: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draw a place at least 0.5 m from the walls of a room of this size, clear of obstacles."""
     while True:
-        place = rng.uniform(room.min(axis=0) + margin_m, room.max(axis=0) - margin_m)
-        if not any(contains(obstacle, place[None])[0] for obstacle in mine.obstacles):
-            return np.array([*place, 1.1])
+        place_m = np.array([*rng.uniform(0.5, size_m - 0.5), 1.1])
+        if not contains(mine.obstacle_parts, place_m[None])[0]:
+            return place_m
 
 
 def link_figures(one: Survey) -> dict[str, float]:
@@ -133,6 +140,18 @@ def walk(anchors_m: NDArray[np.float64], seconds: int) -> tuple[NDArray[np.float
     return tag_m, np.argsort(np.linalg.norm(tag_m[:, None] - anchors_m, axis=2), axis=1)[:, :4]
 
 
+def range_walk(
+    links: TagLinks | FastTagLinks,
+    mine: Mine,
+    anchors_m: NDArray[np.float64],
+    tag_m: NDArray[np.float64],
+    which: NDArray[np.int64],
+) -> Ranges:
+    """Range along a walk."""
+    ways = mine.look(np.repeat(tag_m, which.shape[1], axis=0), anchors_m[which].reshape(-1, 3))
+    return links.measure(tag_m, np.zeros(len(tag_m)), anchors_m[which], which, ways)
+
+
 def throughput() -> dict[str, float]:
     """Person-seconds a processor second: geometry, channel and receiver, 4 links at 10 Hz in the example mine."""
     site = load_site(HERE.parent / "config" / "example_mine")
@@ -142,16 +161,14 @@ def throughput() -> dict[str, float]:
     full = TagLinks(INDUSTRIAL, Radios.draw(1, rng), radios, wearer, rng)
     tag_m, which = walk(anchors_m, 10)
     began = time.process_time()
-    for place_m, four in zip(tag_m, which, strict=True):
-        ways = mine.look(np.repeat(place_m[None], 4, axis=0), anchors_m[four])
-        full.measure(place_m, 0.0, anchors_m[four], four, ways)
+    for second in np.split(np.arange(len(tag_m)), len(tag_m) // 10):
+        range_walk(full, mine, anchors_m, tag_m[second], which[second])
     with_cir = 10.0 / (time.process_time() - began)
     range_law(INDUSTRIAL)
     fast = FastTagLinks(INDUSTRIAL, Radios.draw(1, rng), radios, wearer, rng)
     tag_m, which = walk(anchors_m, 200)
     began = time.process_time()
-    ways = mine.look(np.repeat(tag_m, 4, axis=0), anchors_m[which].reshape(-1, 3))
-    fast.measure(tag_m, np.zeros(len(tag_m)), anchors_m[which], which, ways)
+    range_walk(fast, mine, anchors_m, tag_m, which)
     return {"with_cir": with_cir, "without_cir": 200.0 / (time.process_time() - began)}
 
 
@@ -193,11 +210,9 @@ def run() -> dict[str, Any]:
     surveys: list[list[Survey]] = [[] for _ in SEEDS]
     by_scene: dict[str, Any] = {}
     for name, environment in SCENES.items():
-        site = load_site(HERE / "sim_scenes" / name)
-        mine, anchors_m = mine_of(site), np.array([anchor.position_m for anchor in site.anchors])
         for number, seed in enumerate(SEEDS):
-            surveys[number].append(survey(mine, anchors_m, environment, seed))
-        by_scene[name] = over_seeds([link_figures(scenes[-1]) for scenes in surveys], TAGS * len(anchors_m))
+            surveys[number].append(survey(name, environment, seed))
+        by_scene[name] = over_seeds([link_figures(scenes[-1]) for scenes in surveys], len(surveys[0][-1].obstructed))
     joined = [
         link_figures(
             Survey(

@@ -14,7 +14,13 @@ class GaussMarkov:
 
     def advance(self, which: NDArray[np.int64], step: NDArray[np.float64]) -> NDArray[np.float64]:
         """Move processes `which` (k,), no doubles, by steps (k,) >= 0 and return their values (k,)."""
+        return self.walk(which[None], step[None])
+
+    def walk(self, which: NDArray[np.int64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Advance row by row; which and step: (r, k), no doubles in a row. Returns (r x k,)."""
         kept = np.exp(-step / self._scale)
-        fresh = np.sqrt(1.0 - kept**2) * self._rng.standard_normal(len(which))
-        self._value[which] = kept * self._value[which] + fresh
-        return self._value[which]
+        fresh = np.sqrt(1.0 - kept**2) * self._rng.standard_normal(which.shape)
+        values = np.empty(which.shape)
+        for row, links in enumerate(which):
+            values[row] = self._value[links] = kept[row] * self._value[links] + fresh[row]
+        return values.ravel()

@@ -64,6 +64,12 @@ def first_path_index(magnitude: NDArray[np.float32], level: NDArray[np.float64])
     return np.where(found, index, np.nan)
 
 
+def detect(reception: Reception) -> NDArray[np.float64]:
+    """First-path index [taps] of `n` receptions, NaN where nothing passes the threshold."""
+    magnitude = np.abs(reception.samples)
+    return first_path_index(magnitude, threshold(noise_std(magnitude), reception.symbols, reception.full_count))
+
+
 def read_registers(reception: Reception) -> ReceiveRegisters:
     """Run the leading-edge detection and compute the registers of `n` receptions."""
     magnitude = np.abs(reception.samples)

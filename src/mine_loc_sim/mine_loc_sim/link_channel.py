@@ -7,6 +7,7 @@ that is lost under the noise and a slow onset all follow from this one sum.
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from mine_loc_sim.channel_15_4a import (
     FINE_PER_TAP,
     Floats,
     Taps,
-    bin_count,
     fade,
     path_loss_db,
     power_delay_profile,
@@ -86,27 +86,34 @@ class LinkChannel:
         self._scattered = FadingChannel(environment.scattered, count, rng)
 
     def respond(self, which: Indices, moved_m: Reals, way: Obstruction) -> ResponseBatch:
-        """Move links `which` (k,), no doubles, by (k,) metres and compose their responses."""
-        taps, shadowing_db = self._clear.advance(which, moved_m)
+        """Move links `which` (r, k), no doubles in a row, by (r, k) metres, row by row, and compose r x k responses."""
+        taps, shadowing_db = _walk(self._clear, which, moved_m, np.ones(which.shape, bool))
         level_dbm = constants.TRANSMIT_POWER_DBM - path_loss_db(self._environment.clear, way.distance_m) - shadowing_db
         taps *= _root_mw(level_dbm)
         direct_dbm = _level_dbm(taps[:, :FINE_PER_TAP]) - way.loss_db
         taps = np.pad(taps, ((0, 0), (0, _LONGEST_DETOUR_BINS)))
         blocked = np.flatnonzero(way.loss_db > 0.0)
         taps[blocked] = _past_obstacle(taps[blocked], select(way, blocked))
-        hidden = np.flatnonzero((way.detour_m > 0.0) & np.isfinite(way.detour_m))
-        if len(hidden):
-            width = bin_count(self._environment.scattered) + _LONGEST_DETOUR_BINS
-            taps = np.pad(taps, ((0, 0), (0, max(width - taps.shape[1], 0))))
-            taps[hidden, :width] += self._scatter(which[hidden], moved_m[hidden], select(way, hidden), width)
+        hidden = (way.detour_m > 0.0) & np.isfinite(way.detour_m)
+        if hidden.any():
+            scattered = self._scatter(which, moved_m, way, hidden)
+            taps = np.pad(taps, ((0, 0), (0, max(scattered.shape[1] - taps.shape[1], 0))))
+            taps[hidden, : scattered.shape[1]] += scattered
         return ResponseBatch(taps, _level_dbm(taps), direct_dbm)
 
-    def _scatter(self, which: Indices, moved_m: Reals, way: Obstruction, width: int) -> Taps:
-        """Return what comes round the obstacle or the corner, (k, width)."""
-        taps, shadowing_db = self._scattered.advance(which, moved_m)
-        loss_db = path_loss_db(self._environment.scattered, way.distance_m + way.detour_m) + way.further_loss_db
+    def _scatter(self, which: Indices, moved_m: Reals, way: Obstruction, hidden: NDArray[np.bool_]) -> Taps:
+        """Return what comes round the obstacle or the corner to the `h` hidden links, (h, bins)."""
+        taps, shadowing_db = _walk(self._scattered, which, moved_m, hidden.reshape(which.shape))
+        seen = select(way, hidden)
+        loss_db = path_loss_db(self._environment.scattered, seen.distance_m + seen.detour_m) + seen.further_loss_db
         taps *= _root_mw(constants.TRANSMIT_POWER_DBM - loss_db - shadowing_db)
-        return _delayed(taps, _bins(way.detour_m), width)
+        return _delayed(taps, _bins(seen.detour_m), taps.shape[1] + _LONGEST_DETOUR_BINS)
+
+
+def _walk(channel: FadingChannel, which: Indices, moved_m: Reals, used: NDArray[np.bool_]) -> tuple[Taps, Reals]:
+    """Advance a channel over rows (r, k) where `used`; returns the used links' responses and shadowing in order."""
+    rows = [channel.advance(which[row, used[row]], moved_m[row, used[row]]) for row in np.flatnonzero(used.any(axis=1))]
+    return np.concatenate([taps for taps, _ in rows]), np.concatenate([shadowing_db for _, shadowing_db in rows])
 
 
 def _past_obstacle(direct: Taps, way: Obstruction) -> Taps:
@@ -132,7 +139,7 @@ def knife_edge_loss_db(detour_m: Reals) -> Reals:
     return np.asarray(6.9 + 20.0 * np.log10(np.sqrt(nu**2 + 1.0) + nu))
 
 
-def select(way: Obstruction, which: Indices) -> Obstruction:
+def select(way: Obstruction, which: NDArray[Any]) -> Obstruction:
     """Only the links `which`."""
     return Obstruction(*(getattr(way, field.name)[which] for field in fields(way)))
 

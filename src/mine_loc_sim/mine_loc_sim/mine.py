@@ -6,24 +6,16 @@ galleries and chambers is open. Obstacles and people stand in free space. Map fr
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
 from mine_loc_sim import radio_constants as constants
-from mine_loc_sim.prism import (
-    Floats,
-    Prism,
-    detour,
-    inside_spans,
-    passing_distance,
-    span_lengths,
-    uncovered_length,
-)
+from mine_loc_sim.prism import ConvexPrisms, Floats, Prism, detour, passing_distance, uncovered_length
 
-_JOINT_CORNERS = 12
+_JOINT_CORNERS = 8
 _TURNING_POINTS_TRIED = 6
 _ROUNDING_M = 1e-6
 
@@ -60,12 +52,12 @@ def gallery_prisms(centre_line_m: Sequence[Sequence[float]], width_m: float, hei
     return prisms
 
 
-def rock_length(free: Sequence[Prism], start_m: Floats, end_m: Floats) -> Floats:
+def rock_length(free: ConvexPrisms, start_m: Floats, end_m: Floats) -> Floats:
     """Length [m] of segments (n, 3) that runs outside all of `free`; 0 where nothing is dug and the place is open."""
     length = np.linalg.norm(end_m - start_m, axis=1)
-    if not free:
+    if not len(free.owner):
         return np.zeros(len(length))
-    rock = uncovered_length(np.concatenate([inside_spans(prism, start_m, end_m) for prism in free], axis=1), length)
+    rock = uncovered_length(free.spans(start_m, end_m), length)
     return np.where(rock > _ROUNDING_M, rock, 0.0)
 
 
@@ -78,7 +70,7 @@ class Ways:
     turns: NDArray[np.int64]  # (w, w), turns on the way from the one to the other
 
     @staticmethod
-    def between(free: Sequence[Prism], points_m: Floats) -> "Ways":
+    def between(free: ConvexPrisms, points_m: Floats) -> "Ways":
         """Join points in sight of each other."""
         count = len(points_m)
         first, second = np.divmod(np.arange(count * count), max(count, 1))
@@ -95,7 +87,7 @@ class Ways:
                     turns[row, target] = turns[row, before[row, target]] + 1
         return Ways(points_m, length, turns)
 
-    def around(self, free: Sequence[Prism], start_m: Floats, end_m: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    def around(self, free: ConvexPrisms, start_m: Floats, end_m: Floats) -> tuple[Floats, NDArray[np.int64]]:
         """Length of the shortest way from start to end, (n, 3) each, and its turns; inf and 0 where there is none."""
         count = len(start_m)
         if not len(self.points_m):
@@ -110,7 +102,7 @@ class Ways:
         shortest = total[rows, best]
         return shortest, np.where(np.isfinite(shortest), turns, 0)
 
-    def _in_sight(self, free: Sequence[Prism], points_m: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    def _in_sight(self, free: ConvexPrisms, points_m: Floats) -> tuple[Floats, NDArray[np.int64]]:
         """Distances to the nearest turning points, inf to those out of sight, and their numbers: (n, tried) each."""
         distance = np.linalg.norm(points_m[:, None] - self.points_m[None], axis=2)
         near = np.argsort(distance, axis=1)[:, :_TURNING_POINTS_TRIED]
@@ -123,13 +115,24 @@ class Ways:
 class Mine:
     """Geometry of one place."""
 
-    free: tuple[Prism, ...] = ()
-    obstacles: tuple[Prism, ...] = ()
-    ways: Ways = field(default_factory=lambda: Ways.between((), np.empty((0, 3))))
+    free: ConvexPrisms
+    obstacles: tuple[Prism, ...]
+    obstacle_parts: ConvexPrisms
+    ways: Ways
+
+    @staticmethod
+    def build(
+        free: Sequence[Prism] = (), obstacles: Sequence[Prism] = (), turning_points_m: Floats | None = None
+    ) -> "Mine":
+        """Prepare a mine; turning_points_m: (w, 3) places in free space where ways round a corner may turn."""
+        hollow = ConvexPrisms.of(free)
+        points_m = np.empty((0, 3)) if turning_points_m is None else turning_points_m
+        return Mine(hollow, tuple(obstacles), ConvexPrisms.of(obstacles), Ways.between(hollow, points_m))
 
     def with_obstacles(self, extra: Sequence[Prism]) -> "Mine":
         """The same mine with vehicles where they stand now."""
-        return replace(self, obstacles=self.obstacles + tuple(extra))
+        obstacles = self.obstacles + tuple(extra)
+        return replace(self, obstacles=obstacles, obstacle_parts=ConvexPrisms.of(obstacles))
 
     def look(self, start_m: Floats, end_m: Floats, people_m: Floats | None = None) -> LinkGeometry:
         """Follow links from start to end, (n, 3) each, past other people at (n, p, 2)."""
@@ -139,10 +142,12 @@ class Mine:
         loss = np.where(rock > 0.0, rock * stone.loss_db_per_m + stone.surface_loss_db, 0.0)
         delay = rock * stone.delay_index
         way_round = np.zeros(len(distance))
-        for prism in self.obstacles:
-            thickness = span_lengths(inside_spans(prism, start_m, end_m), distance)
+        spans = self.obstacle_parts.spans(start_m, end_m)
+        inside = (spans[..., 1] - spans[..., 0]) * distance[:, None]
+        for number in np.unique(self.obstacle_parts.owner[(inside > 0.0).any(axis=0)]):
+            prism, matter = self.obstacles[number], constants.MATTER[self.obstacles[number].material]
+            thickness = inside[:, self.obstacle_parts.owner == number].sum(axis=1)
             hit = thickness > 0.0
-            matter = constants.MATTER[prism.material]
             loss += np.where(hit, thickness * matter.loss_db_per_m + matter.surface_loss_db, 0.0)
             delay += thickness * matter.delay_index
             way_round[hit] = np.maximum(way_round[hit], detour(prism, start_m[hit], end_m[hit]))

@@ -1,12 +1,13 @@
-"""Straight rays against prisms: vertical walls over a polygon, from a floor to a top. Vectorised over rays."""
+"""Straight rays against prisms, which are vertical walls over a polygon: all rays against all prisms at once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-_PARALLEL = 1e-12
+_FLAT = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,108 +20,113 @@ class Prism:
     material: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class ConvexPrisms:
+    """Prisms cut into `p` convex parts, each where all of its half-spaces n x >= c meet."""
+
+    normals: Floats  # (p, e, 3), planes repeated to the same number e
+    offsets: Floats  # (p, e)
+    owner: NDArray[np.int64]  # (p,), number of the prism each part belongs to
+
+    @staticmethod
+    def of(prisms: Sequence[Prism]) -> "ConvexPrisms":
+        """Cut prisms up."""
+        parts = [
+            (owner, _half_spaces(corners, prism))
+            for owner, prism in enumerate(prisms)
+            for corners in convex_parts(prism.polygon_m)
+        ]
+        most = max((len(planes) for _, planes in parts), default=1)
+        padded = np.array([np.resize(planes, (most, 4)) for _, planes in parts]).reshape(-1, most, 4)
+        return ConvexPrisms(padded[..., :3], padded[..., 3], np.array([owner for owner, _ in parts], int))
+
+    def spans(self, start_m: Floats, end_m: Floats) -> Floats:
+        """Parts of segments (n, 3) inside each prism: (n, p, 2) fractions of entry and exit, (0, 0) where none."""
+        planes = self.normals.reshape(-1, 3).T
+        shape = (len(start_m), *self.offsets.shape)
+        height = (start_m @ planes).reshape(shape) - self.offsets
+        climb = ((end_m - start_m) @ planes).reshape(shape)
+        flat = np.abs(climb) < _FLAT
+        crossing = -height / np.where(flat, 1.0, climb)
+        entry = np.where(~flat & (climb > 0.0), crossing, 0.0).max(axis=2)
+        leave = np.where(~flat & (climb < 0.0), crossing, 1.0).min(axis=2)
+        empty = (leave <= entry) | (flat & (height < 0.0)).any(axis=2)
+        return np.where(empty[..., None], 0.0, np.clip(np.stack([entry, leave], axis=-1), 0.0, 1.0))
+
+
+def contains(prisms: ConvexPrisms, points_m: Floats) -> NDArray[np.bool_]:
+    """Whether points (n, 3) lie in any of the prisms, (n,)."""
+    height = np.einsum("pek,nk->npe", prisms.normals, points_m) - prisms.offsets
+    return np.asarray((height >= 0.0).all(axis=2).any(axis=1))
+
+
+def _half_spaces(corners_m: Floats, prism: Prism) -> Floats:
+    """Rows (n_x, n_y, n_z, c) of the sides, the floor and the top; corners counter-clockwise."""
+    edge = np.roll(corners_m, -1, axis=0) - corners_m
+    inward = np.column_stack([-edge[:, 1], edge[:, 0]])
+    sides = np.column_stack([inward, np.zeros(len(edge)), (inward * corners_m).sum(axis=1)])
+    return np.vstack([sides, [0.0, 0.0, 1.0, prism.floor_m], [0.0, 0.0, -1.0, -prism.top_m]])
+
+
 def cross(a: Floats, b: Floats) -> Floats:
     """Third component of the cross product of plane vectors (..., 2)."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def contains(prism: Prism, points_m: Floats) -> NDArray[np.bool_]:
-    """Whether points (n, 2) lie over the ground plan (even-odd rule)."""
-    a, b = prism.polygon_m, np.roll(prism.polygon_m, -1, axis=0)
-    x, y = points_m[:, 0, None], points_m[:, 1, None]
-    straddles = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
-    left = x < a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / rise
-    return np.asarray((straddles & left).sum(axis=1) % 2 == 1)
+def convex_parts(polygon_m: Floats) -> list[Floats]:
+    """The polygon itself if convex, else triangles by ear clipping; all counter-clockwise."""
+    corners = polygon_m if cross(polygon_m, np.roll(polygon_m, -1, axis=0)).sum() > 0.0 else polygon_m[::-1]
+    parts: list[Floats] = []
+    while len(corners) > 3:
+        before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
+        turns = cross(corners - before, after - corners)
+        if np.all(turns >= -_FLAT):
+            break
+        ear = next(
+            k for k in range(len(corners)) if turns[k] > 0.0 and _is_empty(before[k], corners[k], after[k], corners)
+        )
+        parts.append(np.array([before[ear], corners[ear], after[ear]]))
+        corners = np.delete(corners, ear, axis=0)
+    return [*parts, corners]
 
 
-def inside_spans(prism: Prism, start_m: Floats, end_m: Floats) -> Floats:
-    """Parts of the segments start-end, (n, 3) each, that lie in the prism.
-
-    Returns (n, k, 2): fractions 0..1 of entry and exit, empty spans have exit <= entry.
-    """
-    spans = np.zeros((len(start_m), len(prism.polygon_m) + 1, 2))
-    low, high = prism.polygon_m.min(axis=0), prism.polygon_m.max(axis=0)
-    near = np.flatnonzero(
-        np.all(np.minimum(start_m, end_m)[:, :2] <= high, axis=1)
-        & np.all(np.maximum(start_m, end_m)[:, :2] >= low, axis=1)
-    )
-    if len(near):
-        start, way = start_m[near], end_m[near] - start_m[near]
-        cuts = _cuts(prism.polygon_m, start, way)
-        pairs = np.stack([cuts[:, :-1], cuts[:, 1:]], axis=-1)
-        middle = start[:, None, :2] + pairs.mean(axis=-1)[..., None] * way[:, None, :2]
-        inside = contains(prism, middle.reshape(-1, 2)).reshape(len(near), -1, 1)
-        spans[near] = _clip_height(np.where(inside, pairs, 0.0), prism, start[:, 2], way[:, 2])
-    return spans
-
-
-def _cuts(polygon_m: Floats, start_m: Floats, way_m: Floats) -> Floats:
-    """Fractions, rising from 0 to 1, at which segments cross edges: (n, edges + 2)."""
-    edge = np.roll(polygon_m, -1, axis=0) - polygon_m
-    offset = polygon_m[None] - start_m[:, None, :2]
-    turn = cross(way_m[:, None, :2], edge[None])
-    safe = np.where(np.abs(turn) < _PARALLEL, np.inf, turn)
-    along = cross(offset, edge[None]) / safe
-    across = cross(offset, way_m[:, None, :2]) / safe
-    hits = (across >= 0.0) & (across <= 1.0) & (along > 0.0) & (along < 1.0)
-    ends = np.zeros((len(way_m), 1))
-    return np.sort(np.concatenate([ends, np.where(hits, along, 1.0), ends + 1.0], axis=1), axis=1)
-
-
-def _clip_height(spans: Floats, prism: Prism, height_m: Floats, climb_m: Floats) -> Floats:
-    """Keep what lies between floor and top."""
-    level = np.abs(climb_m) < 1e-9
-    steep = np.where(level, 1.0, climb_m)
-    at_floor, at_top = (prism.floor_m - height_m) / steep, (prism.top_m - height_m) / steep
-    inside = (height_m >= prism.floor_m) & (height_m <= prism.top_m)
-    low = np.where(level, np.where(inside, 0.0, 2.0), np.minimum(at_floor, at_top))
-    high = np.where(level, 1.0, np.maximum(at_floor, at_top))
-    return np.stack([np.maximum(spans[..., 0], low[:, None]), np.minimum(spans[..., 1], high[:, None])], axis=-1)
-
-
-def span_lengths(spans: Floats, length_m: Floats) -> Floats:
-    """Total length [m] of the spans (n, k, 2) of segments of length (n,)."""
-    return np.asarray(np.maximum(spans[..., 1] - spans[..., 0], 0.0).sum(axis=1) * length_m)
+def _is_empty(a: Floats, b: Floats, c: Floats, corners: Floats) -> bool:
+    """Whether no corner lies strictly inside the triangle a, b, c."""
+    sides = [cross(second - first, corners - first) for first, second in ((a, b), (b, c), (c, a))]
+    return not np.any(np.min(sides, axis=0) > _FLAT)
 
 
 def uncovered_length(spans: Floats, length_m: Floats) -> Floats:
-    """Length [m] of segments that no span covers; spans (n, k, 2) may overlap."""
-    bounds = np.clip(spans, 0.0, 1.0)
-    bounds = np.where(bounds[..., 1:] > bounds[..., :1], bounds, 0.0)
-    bounds = np.take_along_axis(bounds, np.argsort(bounds[..., 0], axis=1)[..., None], axis=1)
-    reached = np.maximum.accumulate(bounds[..., 1], axis=1)
-    gaps = np.maximum(bounds[:, 1:, 0] - reached[:, :-1], 0.0).sum(axis=1) + bounds[:, 0, 0] + 1.0 - reached[:, -1]
+    """Length [m] of segments (n,) that none of the spans (n, p, 2), which may overlap, covers."""
+    order = np.argsort(spans[..., 0], axis=1)
+    entry = np.take_along_axis(spans[..., 0], order, axis=1)
+    reached = np.maximum.accumulate(np.take_along_axis(spans[..., 1], order, axis=1), axis=1)
+    gaps = np.maximum(entry[:, 1:] - reached[:, :-1], 0.0).sum(axis=1) + entry[:, 0] + 1.0 - reached[:, -1]
     return np.asarray(gaps * length_m)
 
 
 def detour(prism: Prism, start_m: Floats, end_m: Floats) -> Floats:
-    """Excess way [m] of the shortest way round or over a convex prism, for segments (n, 3) that cross it.
+    """Excess way [m] of the shortest way round or over a prism, for segments (n, 3) that cross it.
 
     One turning point a side is taken, the farthest out: exact where one corner is rounded, else a lower bound.
     """
     corner = prism.polygon_m[None]
-    way = (end_m - start_m)[:, None, :2]
-    direct = np.linalg.norm(end_m[:, :2] - start_m[:, :2], axis=1)
-    excess = (
-        np.linalg.norm(corner - start_m[:, None, :2], axis=2)
-        + np.linalg.norm(end_m[:, None, :2] - corner, axis=2)
-        - direct[:, None]
-    )
-    left = cross(way, corner - start_m[:, None, :2]) > 0.0
-    round_left = np.where(left, excess, 0.0).max(axis=1)
-    round_right = np.where(~left, excess, 0.0).max(axis=1)
+    start, end = start_m[:, None, :2], end_m[:, None, :2]
+    length = np.linalg.norm(end_m[:, :2] - start_m[:, :2], axis=1)
+    bent = np.linalg.norm(corner - start, axis=2) + np.linalg.norm(end - corner, axis=2)
+    excess = bent - length[:, None]
+    left = cross(end - start, corner - start) > 0.0
+    beside = np.minimum(np.where(left, excess, 0.0).max(axis=1), np.where(left, 0.0, excess).max(axis=1))
     share = np.clip(_nearest_share(prism.polygon_m.mean(axis=0), start_m, end_m), 0.05, 0.95)
     over = start_m + share[:, None] * (end_m - start_m)
     over[:, 2] = np.maximum(over[:, 2], prism.top_m)
     above = np.linalg.norm(over - start_m, axis=1) + np.linalg.norm(end_m - over, axis=1)
-    above -= np.linalg.norm(end_m - start_m, axis=1)
-    return np.asarray(np.minimum(np.minimum(round_left, round_right), above))
+    return np.asarray(np.minimum(beside, above - np.linalg.norm(end_m - start_m, axis=1)))
 
 
 def _nearest_share(point_m: Floats, start_m: Floats, end_m: Floats) -> Floats:
     way = end_m[:, :2] - start_m[:, :2]
-    return np.asarray(((point_m - start_m[:, :2]) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12))
+    return np.asarray(((point_m - start_m[:, :2]) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), _FLAT))
 
 
 def passing_distance(point_m: Floats, start_m: Floats, end_m: Floats) -> Floats:

@@ -26,9 +26,11 @@ from mine_loc_sim.ranging_link import (
     Radios,
     Ranges,
     Reals,
+    Whereabouts,
     early_false_paths_m,
     exchange,
     obstruction,
+    off_facing,
 )
 from mine_loc_sim.wearer import Wearer, body_process
 
@@ -114,7 +116,7 @@ def range_law(environment: Environment) -> RangeLaw:
 def _receive(
     channel: LinkChannel, every: Indices, moved_m: float, way: Obstruction, rng: np.random.Generator
 ) -> Exchanges:
-    batch = channel.respond(every, np.full(len(every), moved_m), way)
+    batch = channel.respond(every[None], np.full((1, len(every)), moved_m), way)
     radios = [Radios.draw(len(every), rng).receiver for _ in range(2)]
     return exchange(batch, way.loss_db, radios[0], radios[1], rng)
 
@@ -147,7 +149,7 @@ class FastTagLinks:
         self._body = body_process(count, rng)
         self._slow = GaussMarkov(count, constants.CLUSTER_LENGTH_M, rng)
         self._quick = GaussMarkov(count, constants.FADING_LENGTH_M, rng)
-        self._last_m = np.full((count, 6), 1e3)
+        self._whereabouts = Whereabouts(count)
 
     def measure(self, tag_m: Reals, facing_rad: Reals, anchor_m: Reals, which: Indices, ways: LinkGeometry) -> Ranges:
         """Range in `r` rounds with `k` anchors each.
@@ -155,34 +157,20 @@ class FastTagLinks:
         tag_m: (r, 3) map, m; facing_rad: (r,) yaw, ENU; anchor_m: (r, k, 3) of anchors `which` (r, k), no doubles in a
         round; ways: geometry of the r x k links, round by round. Returns r x k ranges in that order.
         """
-        bias, body, rank = self._walk(tag_m, anchor_m, which)
-        toward = anchor_m - tag_m[:, None]
-        bearing = np.arctan2(toward[..., 1], toward[..., 0]) - facing_rad[:, None]
-        way = obstruction(ways, *self._wearer.shadow(bearing.ravel(), body))
+        moved_m = self._whereabouts.moved(tag_m, anchor_m, which)
+        body = self._wearer.shadow(off_facing(tag_m, facing_rad, anchor_m), self._body.walk(which, moved_m))
+        way = obstruction(ways, *body)
+        rank = np.sqrt(self._law.kept) * self._slow.walk(which, moved_m)
+        rank += np.sqrt(1.0 - self._law.kept) * self._quick.walk(which, moved_m)
         cell = cell_of(way)
         entry = np.minimum((ndtr(rank) * _ENTRIES).astype(int), _ENTRIES - 1)
         law, link_class = self._law, self._law.link_class[cell, entry]
         by_level_m = level_bias_m(law.level_dbm[cell, entry])
         direct = link_class > 1
         range_m = way.distance_m + law.error_m[cell, entry] + np.where(direct, way.delay_m, 0.0) + by_level_m
-        range_m += constants.SLOW_BIAS_SD_M * bias + self._offset_m[which.ravel()]
+        range_m += constants.SLOW_BIAS_SD_M * self._bias.walk(which, moved_m) + self._offset_m[which.ravel()]
         range_m += law.white_sd_m[cell] * self._rng.standard_normal(len(cell)) - early_false_paths_m(
             len(cell), self._rng
         )
         powers = law.receive_power_dbm[cell, entry], law.first_path_power_dbm[cell, entry]
         return Ranges(np.isfinite(range_m), range_m, by_level_m, link_class, *powers, None)
-
-    def _walk(self, tag_m: Reals, anchor_m: Reals, which: Indices) -> tuple[Reals, Reals, Reals]:
-        """Slow bias, body variation and rank of the error, each (r x k,), standard normal."""
-        ends = np.concatenate([np.broadcast_to(tag_m[:, None], anchor_m.shape), anchor_m], axis=2)
-        walked = np.empty((3, *which.shape))
-        quick = np.sqrt(1.0 - self._law.kept)
-        slow = np.sqrt(self._law.kept)
-        for row, links in enumerate(which):
-            change = ends[row] - self._last_m[links]
-            self._last_m[links] = ends[row]
-            moved_m = np.sqrt((change[:, :3] ** 2).sum(axis=1)) + np.sqrt((change[:, 3:] ** 2).sum(axis=1))
-            walked[0, row] = self._bias.advance(links, moved_m)
-            walked[1, row] = self._body.advance(links, moved_m)
-            walked[2, row] = slow * self._slow.advance(links, moved_m) + quick * self._quick.advance(links, moved_m)
-        return walked[0].ravel(), walked[1].ravel(), walked[2].ravel()

@@ -22,7 +22,7 @@ from mine_loc_sim.dw1000_accumulator import (
     taps_to_m,
 )
 from mine_loc_sim.gauss_markov import GaussMarkov
-from mine_loc_sim.leading_edge import ReceiveRegisters, read_registers
+from mine_loc_sim.leading_edge import ReceiveRegisters, detect, read_registers
 from mine_loc_sim.link_channel import LinkChannel, Obstruction, ResponseBatch
 from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.radio_constants import Environment
@@ -31,7 +31,7 @@ from mine_loc_sim.wearer import Wearer, body_process
 
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_UNUSED_LINK_MOVED_M = 1e3
+_UNUSED_LINK_M = 1e6
 
 
 class LinkClass(IntEnum):
@@ -94,7 +94,7 @@ def exchange(
     at_anchor = accumulate(spectrum, peak_delay_taps, batch.level_dbm, anchor, rng)
     registers = read_registers(at_tag)
     tag_m = taps_to_m(registers.first_path_index - at_tag.direct_index)
-    anchor_m = taps_to_m(read_registers(at_anchor).first_path_index - at_anchor.direct_index)
+    anchor_m = taps_to_m(detect(at_anchor) - at_anchor.direct_index)
     error_m = 0.5 * (tag_m + anchor_m) + edge_lead_m() + constants.CLOCK_JITTER_SD_M * rng.standard_normal(count)
     margin = (batch.level_dbm - constants.SENSITIVITY_DBM) / constants.SENSITIVITY_SOFTNESS_DB
     lost = rng.random(count) > 1.0 / (1.0 + np.exp(-np.clip(margin, -50.0, 50.0)))
@@ -122,6 +122,23 @@ def _classify(
     return np.asarray(np.where(direct_counts < registers.threshold, LinkClass.NO_DIRECT_PATH, kind))
 
 
+class Whereabouts:
+    """Remembers where both ends of `count` links were when they were last used."""
+
+    def __init__(self, count: int) -> None:
+        self._last_m = np.full((count, 6), _UNUSED_LINK_M)
+
+    def moved(self, tag_m: Reals, anchor_m: Reals, which: Indices) -> Reals:
+        """Way of both ends [m] since last use, (r, k); tag_m: (r, 3), anchor_m: (r, k, 3), which: (r, k)."""
+        ends = np.concatenate([np.broadcast_to(tag_m[:, None], anchor_m.shape), anchor_m], axis=2)
+        before = np.empty_like(ends)
+        for row, links in enumerate(which):
+            before[row] = self._last_m[links]
+            self._last_m[links] = ends[row]
+        change = (ends - before) ** 2
+        return np.asarray(np.sqrt(change[..., :3].sum(axis=2)) + np.sqrt(change[..., 3:].sum(axis=2)))
+
+
 class TagLinks:
     """State of the links between one tag and `count` anchors.
 
@@ -136,35 +153,33 @@ class TagLinks:
         self._channel = LinkChannel(environment, count, rng)
         self._bias = GaussMarkov(count, constants.SLOW_BIAS_LENGTH_M, rng)
         self._body = body_process(count, rng)
-        self._last_m = np.full((count, 6), np.nan)
+        self._whereabouts = Whereabouts(count)
 
-    def measure(self, tag_m: Reals, facing_rad: float, anchor_m: Reals, which: Indices, ways: LinkGeometry) -> Ranges:
-        """Range in one round.
+    def measure(self, tag_m: Reals, facing_rad: Reals, anchor_m: Reals, which: Indices, ways: LinkGeometry) -> Ranges:
+        """Range in `r` rounds with `k` anchors each; some 10 rounds at a time run fastest.
 
-        tag_m: (3,) map, m; facing_rad: yaw of the wearer, ENU; anchor_m: (k, 3) of anchors `which` (k,), no doubles;
-        ways: geometry of these k links.
+        tag_m: (r, 3) map, m; facing_rad: (r,) yaw of the wearer, ENU; anchor_m: (r, k, 3) of anchors `which` (r, k), no
+        doubles in a round; ways: geometry of the r x k links. Returns r x k ranges, round by round.
         """
-        moved_m = self._moved(tag_m, anchor_m, which)
-        bearing = np.arctan2(anchor_m[:, 1] - tag_m[1], anchor_m[:, 0] - tag_m[0])
-        body = self._wearer.shadow(bearing - facing_rad, self._body.advance(which, moved_m))
+        moved_m = self._whereabouts.moved(tag_m, anchor_m, which)
+        body = self._wearer.shadow(off_facing(tag_m, facing_rad, anchor_m), self._body.walk(which, moved_m))
         way = obstruction(ways, *body)
         batch = self._channel.respond(which, moved_m, way)
-        found = exchange(batch, way.loss_db, _pick(self._tag, which * 0), _pick(self._anchors, which), self._rng)
-        slow_m = constants.SLOW_BIAS_SD_M * self._bias.advance(which, moved_m)
-        slow_m += self._anchors.offset_m[which] + self._tag.offset_m[0]
+        links = which.ravel()
+        found = exchange(batch, way.loss_db, _pick(self._tag, links * 0), _pick(self._anchors, links), self._rng)
+        slow_m = constants.SLOW_BIAS_SD_M * self._bias.walk(which, moved_m)
+        slow_m += self._anchors.offset_m[links] + self._tag.offset_m[0]
         by_level_m = level_bias_m(found.level_dbm)
-        false_m = early_false_paths_m(len(which), self._rng)
+        false_m = early_false_paths_m(len(links), self._rng)
         range_m = way.distance_m + slow_m + by_level_m + found.error_m - false_m
         powers = found.registers.receive_power_dbm, found.registers.first_path_power_dbm
         return Ranges(np.isfinite(range_m), range_m, by_level_m, found.link_class, *powers, found)
 
-    def _moved(self, tag_m: Reals, anchor_m: Reals, which: Indices) -> Reals:
-        """Way of both ends [m] since the link was last used."""
-        ends = np.concatenate([np.broadcast_to(tag_m, anchor_m.shape), anchor_m], axis=1)
-        change = ends - self._last_m[which]
-        self._last_m[which] = ends
-        moved = np.linalg.norm(change[:, :3], axis=1) + np.linalg.norm(change[:, 3:], axis=1)
-        return np.where(np.isnan(moved), _UNUSED_LINK_MOVED_M, moved)
+
+def off_facing(tag_m: Reals, facing_rad: Reals, anchor_m: Reals) -> Reals:
+    """Angle [rad] between where the wearer faces, (r,), and anchors (r, k, 3); (r x k,), any number of turns."""
+    toward = anchor_m - tag_m[:, None]
+    return np.asarray((np.arctan2(toward[..., 1], toward[..., 0]) - facing_rad[:, None]).ravel())
 
 
 def obstruction(ways: LinkGeometry, body_loss_db: Reals, body_delay_m: Reals) -> Obstruction:

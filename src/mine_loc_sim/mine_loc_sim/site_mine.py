@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from mine_loc_core.site import Chamber, Obstacle, Site, Vehicle
-from mine_loc_sim.mine import Mine, Ways, gallery_prisms
-from mine_loc_sim.prism import Floats, Prism, contains
+from mine_loc_sim.mine import Mine, gallery_prisms
+from mine_loc_sim.prism import ConvexPrisms, Floats, Prism, contains
 
 _EYE_LEVEL_M = 1.5
 """Ways round a corner are followed at this height over the floor, or at half the height of a low gallery."""
+_NO_WAY_OVER_M = 1e6
 
 
 def mine_of(site: Site) -> Mine:
@@ -21,7 +22,7 @@ def mine_of(site: Site) -> Mine:
     ]
     free += [_prism(chamber) for chamber in site.chambers]
     obstacles = tuple(_to_the_roof(_prism(obstacle, obstacle.material), free) for obstacle in site.obstacles)
-    return Mine(tuple(free), obstacles, Ways.between(free, _turning_points(site)))
+    return Mine.build(free, obstacles, _turning_points(site))
 
 
 def vehicle_prism(vehicle: Vehicle, x_m: float, y_m: float, floor_m: float, yaw_rad: float) -> Prism:
@@ -39,9 +40,9 @@ def _prism(part: Chamber | Obstacle, material: str = "") -> Prism:
 
 def _to_the_roof(obstacle: Prism, free: list[Prism]) -> Prism:
     """Close the gap over an obstacle that reaches the roof, so that no way leads over it."""
-    middle = obstacle.polygon_m.mean(axis=0, keepdims=True)
-    roofs = [room.top_m for room in free if contains(room, middle)[0]]
-    return replace(obstacle, top_m=np.inf) if roofs and obstacle.top_m >= max(roofs) else obstacle
+    middle = np.array([[*obstacle.polygon_m.mean(axis=0), obstacle.floor_m]])
+    roofs = [room.top_m for room in free if contains(ConvexPrisms.of([room]), middle)[0]]
+    return replace(obstacle, top_m=_NO_WAY_OVER_M) if roofs and obstacle.top_m >= max(roofs) else obstacle
 
 
 def _turning_points(site: Site) -> Floats:
