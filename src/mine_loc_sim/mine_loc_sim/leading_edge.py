@@ -33,14 +33,14 @@ class ReceiveRegisters:
 
 
 def noise_std(magnitude: NDArray[np.float32]) -> NDArray[np.float64]:
-    """STD_NOISE of magnitudes (n, 1016): standard deviation of |z| before the first path."""
+    """STD_NOISE of magnitudes (n, 1016), by the spread of |z| before the first path."""
     first, last = constants.NOISE_WINDOW_TAPS
-    return np.asarray(magnitude[:, first:last].std(axis=1), float)
+    return constants.STD_NOISE_SHARE * np.asarray(magnitude[:, first:last].std(axis=1), float)
 
 
 def threshold(deviation: NDArray[np.float64], symbols: NDArray[np.int64], full_count: int) -> NDArray[np.float64]:
     """LDE_THRESH: NTM times the noise, more when accumulation stopped early."""
-    early = np.maximum(1.0, constants.SATURATED_THRESHOLD_SHARE * full_count / symbols)
+    early = np.clip(constants.SATURATED_THRESHOLD_SHARE * full_count / symbols, 1.0, constants.SATURATED_THRESHOLD_MOST)
     return constants.NOISE_THRESHOLD_MULTIPLIER * deviation * early
 
 

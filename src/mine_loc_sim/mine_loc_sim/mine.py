@@ -18,6 +18,8 @@ from mine_loc_sim.prism import ConvexPrisms, Floats, Prism, detour, passing_dist
 _JOINT_CORNERS = 8
 _TURNING_POINTS_TRIED = 6
 _ROUNDING_M = 1e-6
+_STRAIGHTNESS_M = 1e-3
+"""Added for every turn, so that of equal ways the straightest is taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ class Ways:
         """Join points in sight of each other."""
         count = len(points_m)
         first, second = np.divmod(np.arange(count * count), max(count, 1))
-        straight = np.linalg.norm(points_m[first] - points_m[second], axis=1)
+        straight = np.linalg.norm(points_m[first] - points_m[second], axis=1) + _STRAIGHTNESS_M
         hidden = rock_length(free, points_m[first], points_m[second]) > 0.0
         graph = np.where(hidden, 0.0, straight).reshape(count, count)
         length, before = (

@@ -88,8 +88,12 @@ SELF_NOISE_LN_SD = 0.4
 """Noise floor that grows with the signal, as share of the root of total energy (cirs, placements at the ceiling)."""
 NOISE_THRESHOLD_MULTIPLIER = 13.0
 """NTM of LDE_CFG1, default 0x6D (UM 7.2.47)."""
+STD_NOISE_SHARE = 0.87
+"""STD_NOISE over the standard deviation of |z| before the first path: logged thresholds are this much lower (cirs)."""
 SATURATED_THRESHOLD_SHARE = 0.58
 """A saturated reception's threshold is higher by this share of the full preamble count over RXPACC (cirs)."""
+SATURATED_THRESHOLD_MOST = 2.3
+"""Most that this raises it, at the smallest RXPACC of cirs, 258."""
 NOISE_WINDOW_TAPS = (64, 700)
 """Where STD_NOISE is taken: before any first path of cirs; the chip's own window is not published, assumed."""
 SEARCH_START_TAP = 720

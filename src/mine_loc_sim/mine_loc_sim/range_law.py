@@ -167,7 +167,13 @@ class FastTagLinks:
         law, link_class = self._law, self._law.link_class[cell, entry]
         by_level_m = level_bias_m(law.level_dbm[cell, entry])
         direct = link_class > 1
-        range_m = way.distance_m + law.error_m[cell, entry] + np.where(direct, way.delay_m, 0.0) + by_level_m
+        closed = way.sealed & np.isinf(way.detour_m)
+        range_m = (
+            np.where(closed, np.nan, way.distance_m)
+            + law.error_m[cell, entry]
+            + np.where(direct, way.delay_m, 0.0)
+            + by_level_m
+        )
         range_m += constants.SLOW_BIAS_SD_M * self._bias.walk(which, moved_m) + self._offset_m[which.ravel()]
         range_m += law.white_sd_m[cell] * self._rng.standard_normal(len(cell)) - early_false_paths_m(
             len(cell), self._rng
