@@ -12,5 +12,5 @@ def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
     if not 0.0 < probability < 1.0:
         raise ValueError(f"probability {probability} is not within (0, 1)")
     if degrees_of_freedom == 2:
-        return -2.0 * math.log(1.0 - probability)
+        return -2.0 * math.log1p(-probability)
     return float(chi2.ppf(probability, degrees_of_freedom))
