@@ -24,7 +24,7 @@ from mine_loc_pdr.fdilink import AhrsFrame, ImuFrame, encode  # noqa: E402
 pytestmark = pytest.mark.graph
 DOMAIN = 71
 DEADLINE_S = 15.0
-# A pair captured from hardware (docs/fdilink.md).
+# A pair captured from hardware (docs/wire-formats.md).
 FORCE_FRD = (-1.71206212, -8.41688156, -4.73239422)
 ORIENTATION_NED = (-0.15401509, 0.01277107, 0.50925660, 0.84662509)
 
