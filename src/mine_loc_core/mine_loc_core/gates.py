@@ -3,7 +3,7 @@
 import functools
 import math
 
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 
 @functools.cache
@@ -13,4 +13,4 @@ def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
         raise ValueError(f"probability {probability} is not within (0, 1)")
     if degrees_of_freedom == 2:
         return -2.0 * math.log(1.0 - probability)
-    return float(chi2.ppf(probability, degrees_of_freedom))
+    return 2.0 * float(gammaincinv(degrees_of_freedom / 2.0, probability))
