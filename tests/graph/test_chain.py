@@ -85,8 +85,10 @@ def test_every_topic_of_the_chain_speaks(heard, topic):
 def test_every_node_reports_itself_well(graph, heard):
     del heard
     graph.observer.wait_for(
-        lambda: {name.split(":")[0] for name in graph.observer.status}
-        >= {"dwm1000_driver_gate", "uwb_solver", "walker/n100_driver", "pdr", "synchroniser", "fusion"}
+        lambda: (
+            {name.split(":")[0] for name in graph.observer.status}
+            >= {"dwm1000_driver_gate", "uwb_solver", "walker/n100_driver", "pdr", "synchroniser", "fusion"}
+        )
     )
     faulty = {name: status.message for name, status in graph.observer.status.items() if status.level != b"\x00"}
     assert faulty == {}
@@ -94,7 +96,9 @@ def test_every_node_reports_itself_well(graph, heard):
 
 def test_fused_positions_are_where_the_walker_is(graph, heard):
     errors_m = [
-        math.dist((item.pose.pose.position.x, item.pose.pose.position.y), graph.walker.position_at(to_stamp_ns(item.stamp)))
+        math.dist(
+            (item.pose.pose.position.x, item.pose.pose.position.y), graph.walker.position_at(to_stamp_ns(item.stamp))
+        )
         for array in heard["poses"].messages[-40:]
         for item in array.people
     ]
@@ -109,7 +113,9 @@ def test_stamps_are_instants_of_measurement_though_bytes_come_late(graph, heard,
     if topic == "ranges":
         true_ns = [graph.walker.stamp_ns(message.device_ticks) for message in messages]
     else:
-        true_ns = [graph.walker.start_ns + round((s - graph.walker.start_ns) / 1e7) * 10**7 for s in stamps_ns(messages)]
+        true_ns = [
+            graph.walker.start_ns + round((s - graph.walker.start_ns) / 1e7) * 10**7 for s in stamps_ns(messages)
+        ]
     errors_ms = (np.array(stamps_ns(messages)) - np.array(true_ns)) / 1e6
     assert abs(errors_ms).max() < 20.0
     assert np.ptp(errors_ms) < 10.0

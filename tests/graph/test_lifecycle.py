@@ -59,7 +59,9 @@ def test_a_node_survives_twenty_cycles_and_answers_each_round_once_while_active(
         observer.wait_for(lambda: observer.node.count_publishers("uwb/pose") == 1, what="the one publisher")
         send()
         wanted = sent[-1]
-        observer.wait_for(lambda n=wanted: n in [pose.seq for pose in poses.messages], what=f"the pose of round {wanted}")
+        observer.wait_for(
+            lambda n=wanted: n in [pose.seq for pose in poses.messages], what=f"the pose of round {wanted}"
+        )
         change(observer, Transition.TRANSITION_DEACTIVATE)
         change(observer, Transition.TRANSITION_CLEANUP)
         observer.wait_for(lambda: rounds.get_subscription_count() == 0, what="no subscription left")

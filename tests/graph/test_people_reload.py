@@ -72,7 +72,9 @@ def test_a_new_person_is_positioned_and_the_others_go_on_undisturbed(graph):
 
 
 def test_a_bad_edit_is_reported_and_changes_nothing(graph):
-    (graph.folder / "site" / "people.yaml").write_text("schema: 1\npeople:\n  - {name: walker, tag_id: -4, height_m: 1.7}\n")
+    (graph.folder / "site" / "people.yaml").write_text(
+        "schema: 1\npeople:\n  - {name: walker, tag_id: -4, height_m: 1.7}\n"
+    )
     graph.observer.wait_for(lambda: "The people stay as they were." in graph.up.output)
     line = next(line for line in graph.up.output.splitlines() if "people.yaml:3" in line)
     assert "tag_id" in line
