@@ -1,16 +1,17 @@
 """`kill -9` of each node in turn: it is back, and the people are positioned again, within three seconds."""
 
+import itertools
 import signal
 import time
 from collections.abc import Iterator
 
 import pytest
+from graph.live_graph import LiveGraph, live_graph
+from graph.observer import Heard
 from mine_loc_interfaces.msg import Epoch, PersonPose, PersonPoseArray, UwbPose, UwbRangeArray
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from graph.live_graph import LiveGraph, live_graph
-from graph.observer import Heard
 from mine_loc_core.nodes.qos import STREAM
 
 pytestmark = pytest.mark.graph
@@ -58,7 +59,7 @@ def test_output_continues_within_three_seconds_of_the_kill(graph, heard, node, r
     observer.wait_for(lambda: own.since(died_s) and positioned_by_uwb())
     recovered_s = time.monotonic() - killed_s
     arrivals = [killed_s, *(at_s for at_s in poses.at_s if at_s > killed_s)]
-    gap_s = max(later - earlier for earlier, later in zip(arrivals, arrivals[1:], strict=False))
+    gap_s = max(later - earlier for earlier, later in itertools.pairwise(arrivals))
     record_property("recovered_s", round(recovered_s, 2))
     print(f"{node}: its output back after {recovered_s:.2f} s, longest gap of fused/poses {gap_s:.2f} s")
     assert recovered_s < 3.0

@@ -14,7 +14,7 @@ from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.serial_link import SerialLink
-from mine_loc_core.stamps import to_ns
+from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
 from mine_loc_pdr.parameters import N100DriverParameters
 
@@ -77,7 +77,7 @@ class N100Driver(NodeBase):
 
     def _new_clock(self) -> DeviceClock:
         p = self.parameters
-        return DeviceClock(_TICK_S, _COUNTER_BITS, latency_ns=to_ns(p.latency), bypass=p.stamp_on_arrival)
+        return DeviceClock(_TICK_S, _COUNTER_BITS, latency_ns=round(p.latency_ms * NS_PER_MS), bypass=p.stamp_on_arrival)
 
     def _drain(self) -> None:
         for chunk in self._link.take():
