@@ -20,7 +20,7 @@ from mine_loc_pdr.parameters import N100DriverParameters
 
 _TICK_S = 1e-6
 _COUNTER_BITS = 64
-_SILENT_S = 1.0
+_SILENT_S = 0.8  # with diagnostics once a second, two seconds from the last byte to the error
 # A timer in the events executor costs a third of waking the other one for every few bytes; stamps are the device's.
 _DRAIN_PERIOD_S = 0.005
 _ABSENT = [-1.0] + 8 * [0.0]  # sensor_msgs/Imu: this quantity is not there
