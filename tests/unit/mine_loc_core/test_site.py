@@ -201,5 +201,7 @@ def test_the_published_schemas_are_valid_schemas(name):
 
 
 def test_a_line_whose_format_names_no_tag_may_be_given_one(tmp_path):
-    content = with_change(["uwb_receivers"], [{"name": "t", "port": "/dev/ttyACM0", "format": "dwm1001_shell", "tag": 7}])
+    content = with_change(
+        ["uwb_receivers"], [{"name": "t", "port": "/dev/ttyACM0", "format": "dwm1001_shell", "tag": 7}]
+    )
     assert load_site(written(tmp_path, content)).uwb_receivers[0].tag_id == 7

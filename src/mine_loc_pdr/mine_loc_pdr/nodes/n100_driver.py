@@ -77,7 +77,9 @@ class N100Driver(NodeBase):
 
     def _new_clock(self) -> DeviceClock:
         p = self.parameters
-        return DeviceClock(_TICK_S, _COUNTER_BITS, latency_ns=round(p.latency_ms * NS_PER_MS), bypass=p.stamp_on_arrival)
+        return DeviceClock(
+            _TICK_S, _COUNTER_BITS, latency_ns=round(p.latency_ms * NS_PER_MS), bypass=p.stamp_on_arrival
+        )
 
     def _drain(self) -> None:
         for chunk in self._link.take():
