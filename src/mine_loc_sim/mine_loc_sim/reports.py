@@ -85,7 +85,7 @@ class Reporters:
             return
         if self._options.tdoa and len(heard.which) > 1 and np.isfinite(heard.range_m[0]):
             yield line.name, self._blink(tag_id, heard, sync_m)
-        if heard.exchanges is not None:
+        if heard.accumulators is not None:
             yield from ((line.name, window) for window in _windows(ranging, heard))
 
     def _line(self, tag_id: int, heard: HeardRound) -> UwbReceiver | None:
@@ -137,11 +137,11 @@ class Reporters:
 
 def _windows(ranging: RangingRound, heard: HeardRound) -> Iterator[CirWindow]:
     """Whole accumulators of the exchanges that succeeded."""
-    assert heard.exchanges is not None
+    assert heard.accumulators is not None
     for number, (measured, reception) in enumerate(zip(ranging.ranges, heard.receptions, strict=True)):
         if not reception.preamble_count:
             continue
-        samples = heard.exchanges.reception.samples[number]
+        samples = heard.accumulators[number]
         yield CirWindow(
             tag_id=ranging.tag_id,
             anchor_id=measured.anchor_id,

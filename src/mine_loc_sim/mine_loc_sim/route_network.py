@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.site import Site
 from mine_loc_sim import scene_constants as sc
-from mine_loc_sim.prism import Prism, contains, inside_spans
+from mine_loc_sim.prism import ConvexPrisms, Prism, contains
 from mine_loc_sim.route import WayPoint
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ class RouteNetwork:
     A site without galleries and chambers has no nodes: there people walk in `box_m` (2, 2), lowest and highest x, y.
     """
 
-    def __init__(self, site: Site, obstacles: tuple[Prism, ...]) -> None:
+    def __init__(self, site: Site, obstacles: ConvexPrisms) -> None:
         self._obstacles = obstacles
         self._nodes: list[Array] = []
         self._room_m: list[float] = []
@@ -56,19 +56,20 @@ class RouteNetwork:
         lengths = np.array([np.linalg.norm(self._nodes[a] - self._nodes[b]) for a, b in pairs])
         last, goal = pairs[rng.choice(len(pairs), p=lengths / lengths.sum())]
         here = self._beside(rng, last, goal, rng.uniform(0.1, 0.9))
-        points, walked = [WayPoint(_point(here), pause_s=_first_pause(rng))], 0.0
+        points, walked, refused = [WayPoint(_point(here), pause_s=_first_pause(rng))], 0.0, 0
         while walked < length_m:
-            turn_back = rng.random() < sc.TURN_BACK_SHARE
-            there = self._beside(rng, last, goal, rng.uniform(0.3, 0.7) if turn_back else 1.0)
-            if turn_back:
-                last, goal = goal, last
-            else:
-                last, goal = goal, self._next(rng, last, goal)
+            half_way = rng.random() < sc.TURN_BACK_SHARE
+            there = self._beside(rng, last, goal, rng.uniform(0.3, 0.7) if half_way else 1.0)
             step_m = float(np.linalg.norm(there - here))
             if step_m < _SHORTEST_LEG_M or self._blocked(here, there):
+                refused += 1
+                if refused > _TRIES:
+                    raise ConfigurationError(f"no way on from {_point(here)}; allowed: galleries with room to walk")
+                last, goal = goal, last
                 continue
             points.append(WayPoint(_point(there), pause_s=_pause(rng)))
-            here, walked = there, walked + step_m
+            here, walked, refused = there, walked + step_m, 0
+            last, goal = (goal, last) if half_way else (goal, self._next(rng, last, goal))
         return points
 
     def _next(self, rng: np.random.Generator, last: int, node: int) -> int:
@@ -105,7 +106,7 @@ class RouteNetwork:
         return points
 
     def _inside_obstacle(self, place: Array) -> bool:
-        return any(contains(obstacle, place[None, :2])[0] for obstacle in self._obstacles)
+        return bool(contains(self._obstacles, place[None] + np.array([0.0, 0.0, _WAIST_M]))[0])
 
     def _blocked(self, here: Array, there: Array) -> bool:
         """Whether the straight way, or a body's width beside it, meets an obstacle."""
@@ -113,8 +114,8 @@ class RouteNetwork:
         side = sc.CLEARANCE_M * np.array([-along[1], along[0], 0.0])
         ahead = sc.CLEARANCE_M * np.append(along, 0.0)
         offsets = np.stack([side, -side, 0.0 * side]) + np.array([0.0, 0.0, _WAIST_M])
-        spans = [inside_spans(o, here + offsets - ahead, there + offsets + ahead) for o in self._obstacles]
-        return any(bool(np.any(span[..., 1] > span[..., 0])) for span in spans)
+        spans = self._obstacles.spans(here + offsets - ahead, there + offsets + ahead)
+        return bool(np.any(spans[..., 1] > spans[..., 0]))
 
     def _node(self, place: Array, room_m: float) -> int:
         for number, known in enumerate(self._nodes):
@@ -145,21 +146,22 @@ class RouteNetwork:
 
     def _open_chamber(self, polygon_m: Array, floor_m: float) -> None:
         """Join a free place near the chamber's middle to the gallery ends that lie in it or at its wall."""
-        room = Prism(polygon_m, floor_m, floor_m + 1.0)
+        room = ConvexPrisms.of([Prism(polygon_m, floor_m - 1.0, floor_m + 1.0)])
         middle = np.append(polygon_m.mean(axis=0), floor_m)
-        ends = [n for n, place in enumerate(self._nodes) if contains(room, (place + 0.02 * (middle - place))[None, :2])[0]]
-        free = [self._free_place(room, middle, self._nodes[end]) for end in ends]
+        inward = [place + 0.02 * (middle - place) for place in self._nodes]
+        ends = [number for number, place in enumerate(inward) if contains(room, place[None])[0]]
+        free = [self._free_place(room, polygon_m, middle, self._nodes[end]) for end in ends]
         for end, place in zip(ends, free, strict=True):
             if place is not None:
                 self._join(end, self._node(place, 0.0))
 
-    def _free_place(self, room: Prism, middle: Array, door: Array) -> Array | None:
+    def _free_place(self, room: ConvexPrisms, polygon_m: Array, middle: Array, door: Array) -> Array | None:
         """Return the place nearest the middle, on a grid, to which a straight way leads from the door."""
-        low, high = room.polygon_m.min(axis=0) + 1.0, room.polygon_m.max(axis=0) - 1.0
-        places = [np.array([x, y, middle[2]]) for x in np.linspace(low[0], high[0], 9) for y in np.linspace(low[1], high[1], 9)]
+        columns, rows = (np.linspace(low + 1.0, high - 1.0, 9) for low, high in zip(polygon_m.min(0), polygon_m.max(0), strict=True))
+        places = [np.array([x, y, middle[2]]) for x in columns for y in rows]
         for place in sorted(places, key=lambda p: float(np.linalg.norm(p - middle))):
             far_enough = np.linalg.norm(place - door) > _SHORTEST_LEG_M
-            if far_enough and contains(room, place[None, :2])[0] and not self._blocked(door, place):
+            if far_enough and contains(room, place[None])[0] and not self._blocked(door, place):
                 return place
         return None
 

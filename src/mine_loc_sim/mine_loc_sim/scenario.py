@@ -25,12 +25,13 @@ from mine_loc_sim.route import plan_route
 from mine_loc_sim.route_network import RouteNetwork
 from mine_loc_sim.scene import SceneOptions, anchor_places_m, check_formats, line_of
 from mine_loc_sim.site_mine import mine_of, vehicle_prism
-from mine_loc_sim.tag_radio import HeardRound, RoundPlan, TagRadio, select_links, shortest_ways
+from mine_loc_sim.tag_radio import HeardRound, RoundPlan, TagRadio, shortest_ways
 from mine_loc_sim.walker import TrueStep, TrueTurn, Walker
 from mine_loc_uwb.ranging import CirWindow, TdoaBlink
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
+_CROWD_STEP_NS = NS_PER_S // 10
 Frame = ReportedRound | CirWindow | TdoaBlink | ImuFrame | AhrsFrame
 Timed = tuple[int, Frame]
 
@@ -97,7 +98,7 @@ class Scenario:
         self._field = GalleryField(np.random.default_rng(seeds[0]))
         self._radios = Radios.draw(len(self._anchors_m), np.random.default_rng(seeds[1]))
         self._reporters = Reporters(site, people, self._anchors_m, np.random.default_rng(seeds[2]), options)
-        network = RouteNetwork(site, self._mine.obstacles)
+        network = RouteNetwork(site, self._mine.obstacle_parts)
         rngs = [np.random.default_rng(seed) for seed in seeds[3:]]
         self._bodies = {
             person.name: self._body(person, network, rng) for person, rng in zip(people, rngs, strict=True)
@@ -154,16 +155,13 @@ class Scenario:
     def _rounds(self, start_ns: int, stop_ns: int) -> list[tuple[Person, HeardRound]]:
         """All rounds of the block, in order of time. Tags have their turns one after the other within a period."""
         tagged = [body for body in self._bodies.values() if body.tag is not None]
-        heard: list[tuple[Person, HeardRound]] = []
         stamps = [self._round_stamps(slot / len(tagged), start_ns, stop_ns) for slot in range(len(tagged))]
-        poses = [body.pose(stamp_ns) for body, stamp_ns in zip(tagged, stamps, strict=True)]
-        for number, (body, pose) in enumerate(zip(tagged, poses, strict=True)):
-            if not len(pose.stamp_ns):
-                continue
-            others = [other.pose(pose.stamp_ns).position_m[:, :2] for i, other in enumerate(tagged) if i != number]
-            assert body.tag is not None
-            plan = self._plan(pose, np.stack(others, axis=1) if others else None)
-            heard += [(body.person, each) for each in body.tag.measure(plan)]
+        crowd = _Crowd(tagged, start_ns, stop_ns)
+        heard: list[tuple[Person, HeardRound]] = []
+        for number, (body, stamp_ns) in enumerate(zip(tagged, stamps, strict=True)):
+            if body.tag is not None and len(stamp_ns):
+                plan = self._plan(body.pose(stamp_ns), crowd.others_m(number, stamp_ns))
+                heard += [(body.person, each) for each in body.tag.measure(plan)]
         return sorted(heard, key=lambda item: item[1].stamp_ns)
 
     def _round_stamps(self, phase: float, start_ns: int, stop_ns: int) -> Stamps:
@@ -172,17 +170,26 @@ class Scenario:
         return np.rint((np.arange(first, last) + phase) * period_ns).astype(np.int64)
 
     def _plan(self, pose: TruePose, others_m: Array | None) -> RoundPlan:
-        """Choose the anchors of each round: of the nearest, those with the shortest ways."""
-        distance_m = np.linalg.norm(pose.position_m[:, None] - self._anchors_m, axis=2)
+        """Choose anchors every few rounds: of the nearest, those with the shortest ways."""
+        rounds = len(pose.stamp_ns)
+        asked = np.arange(0, rounds, sc.DISCOVERY_ROUNDS)
+        distance_m = np.linalg.norm(pose.position_m[asked, None] - self._anchors_m, axis=2)
         near = np.argsort(distance_m, axis=1, kind="stable")[:, : sc.CANDIDATES]
-        places_m = self._places_m(pose.stamp_ns, near)
-        people_m = None if others_m is None else np.repeat(others_m, near.shape[1], axis=0)
-        tag_m = np.repeat(pose.position_m, near.shape[1], axis=0)
-        ways = self._mine.look(tag_m, places_m.reshape(-1, 3), people_m)
-        which, links, tried = shortest_ways(ways, near, min(sc.ANCHORS_A_ROUND, near.shape[1]))
-        anchor_m = places_m.reshape(-1, 3)[links]
-        ways = select_links(ways, links.ravel())
-        return RoundPlan(pose.stamp_ns, pose.position_m, pose.heading_rad, which, anchor_m, tried, ways)
+        found = self._mine.look(*self._links(pose, asked, near))
+        chosen, answers = shortest_ways(found, near, sc.ANCHORS_A_ROUND)
+        every = np.arange(rounds)
+        latest = every // sc.DISCOVERY_ROUNDS
+        which = chosen[latest]
+        links = self._links(pose, every, which)
+        people_m = None if others_m is None else np.repeat(others_m, which.shape[1], axis=0)
+        ways = self._mine.look(*links, people_m)
+        anchor_m = links[1].reshape(*which.shape, 3)
+        return RoundPlan(pose.stamp_ns, pose.position_m, pose.heading_rad, which, anchor_m, answers[latest], ways)
+
+    def _links(self, pose: TruePose, rounds: NDArray[np.int64], which: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Both ends (r x k, 3) of the links of some rounds (r,) to anchors `which` (r, k)."""
+        tag_m = np.repeat(pose.position_m[rounds], which.shape[1], axis=0)
+        return tag_m, self._places_m(pose.stamp_ns[rounds], which).reshape(-1, 3)
 
     def _places_m(self, stamp_ns: Stamps, which: NDArray[np.int64]) -> Array:
         """Where anchors `which` (r, k) truly hang at stamps (r,), as (r, k, 3)."""
@@ -192,6 +199,22 @@ class Scenario:
             during = (stamp_ns >= away.start_ns) & (stamp_ns < away.stop_ns)
             places = places + ((which == number) & during[:, None])[..., None] * np.array(away.shift_m)
         return np.asarray(places)
+
+
+class _Crowd:
+    """Where everybody is in plan during a block, every tenth of a second and straight between."""
+
+    def __init__(self, bodies: Sequence[_Body], start_ns: int, stop_ns: int) -> None:
+        self._stamp_ns = np.arange(start_ns, stop_ns + 2 * _CROWD_STEP_NS, _CROWD_STEP_NS)
+        self._places_m = [body.pose(self._stamp_ns).position_m[:, :2] for body in bodies] if len(bodies) > 1 else []
+
+    def others_m(self, number: int, stamp_ns: Stamps) -> Array | None:
+        """Places (n, others, 2) of all but one; None if there is nobody else."""
+        others = [places for i, places in enumerate(self._places_m) if i != number]
+        if not others:
+            return None
+        columns = [np.interp(stamp_ns, self._stamp_ns, places[:, axis]) for places in others for axis in (0, 1)]
+        return np.stack(columns, axis=1).reshape(len(stamp_ns), -1, 2)
 
 
 def _with_vehicles(site: Site) -> Mine:

@@ -11,6 +11,8 @@ ANCHORS_A_ROUND = 4
 """Most anchors that a tag ranges in a round, as the TREK1000 kit does."""
 CANDIDATES = 8
 """Anchors near a tag whose ways are followed before the shortest few are ranged."""
+DISCOVERY_ROUNDS = 10
+"""A tag looks for anchors anew after so many rounds: assumed."""
 REACH_M = 120.0
 """Longest way over which an anchor answers: assumed; vendors plan 20 to 50 m between anchors, 100 m in clear tunnels."""
 LOST_ROUND_SHARE = 0.01

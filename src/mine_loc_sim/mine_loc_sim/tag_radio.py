@@ -1,7 +1,7 @@
 """The ranging rounds of one tag: which anchors it ranges, and what the chip reports of each exchange."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,23 +44,18 @@ class HeardRound:
     level_bias_m: Reals
     link_class: Indices  # truth, LinkClass
     receptions: tuple[Reception, ...]
-    exchanges: Exchanges | None
+    accumulators: NDArray[np.complex64] | None  # (k, 1016)
 
 
-def shortest_ways(ways: LinkGeometry, candidates: Indices, count: int) -> tuple[Indices, Indices, NDArray[np.bool_]]:
-    """Choose the `count` candidates (r, c) of each round with the shortest ways, and say which are within reach.
+def shortest_ways(ways: LinkGeometry, candidates: Indices, count: int) -> tuple[Indices, NDArray[np.bool_]]:
+    """Choose up to `count` of the candidates (r, c) of each round, those with the shortest ways.
 
-    Returns their numbers (r, count), their places among the r x c links (r, count), and whether they answer.
+    Returns their numbers (r, k) and whether they are near enough to answer (r, k).
     """
     way_m = (ways.distance_m + ways.detour_m).reshape(candidates.shape)
     best = np.argsort(way_m, axis=1, kind="stable")[:, :count]
     rows = np.arange(len(candidates))[:, None]
-    return candidates[rows, best], rows * candidates.shape[1] + best, way_m[rows, best] <= sc.REACH_M
-
-
-def select_links(ways: LinkGeometry, which: Indices) -> LinkGeometry:
-    """Only the links `which`."""
-    return LinkGeometry(*(getattr(ways, field.name)[which] for field in fields(ways)))
+    return candidates[rows, best], way_m[rows, best] <= sc.REACH_M
 
 
 class TagRadio:
@@ -75,46 +70,28 @@ class TagRadio:
         cir: bool,
     ) -> None:
         links = (environment, Radios.draw(1, rng), anchors, Wearer.draw(rng), rng)
-        self._full = TagLinks(*links) if cir else None
-        self._fast = None if cir else FastTagLinks(*links)
+        self._links = TagLinks(*links) if cir else FastTagLinks(*links)
 
     def measure(self, plan: RoundPlan) -> list[HeardRound]:
         """Measure the rounds of a plan."""
-        rounds = range(len(plan.stamp_ns))
-        if self._full is not None:
-            return [self._round_with_cir(self._full, plan, number) for number in rounds]
-        assert self._fast is not None
-        ranges = self._fast.measure(plan.tag_m, plan.facing_rad, plan.anchor_m, plan.which, plan.ways)
-        count = plan.which.shape[1]
-        return [
-            _heard(plan, number, ranges, number * count + np.flatnonzero(plan.tried[number])) for number in rounds
-        ]
-
-    def _round_with_cir(self, links: TagLinks, plan: RoundPlan, number: int) -> HeardRound:
-        tried = np.flatnonzero(plan.tried[number])
-        if not len(tried):
-            nothing = np.empty(0)
-            return HeardRound(
-                int(plan.stamp_ns[number]), plan.tag_m[number], tried, nothing, nothing, nothing, tried, (), None
-            )
-        ways = select_links(plan.ways, number * plan.which.shape[1] + tried)
-        which, anchor_m = plan.which[number, tried], plan.anchor_m[number, tried]
-        ranges = links.measure(plan.tag_m[number], float(plan.facing_rad[number]), anchor_m, which, ways)
-        return _heard(plan, number, ranges, np.arange(len(which)))
+        ranges = self._links.measure(plan.tag_m, plan.facing_rad, plan.anchor_m, plan.which, plan.ways)
+        return [_heard(plan, number, ranges) for number in range(len(plan.stamp_ns))]
 
 
-def _heard(plan: RoundPlan, number: int, ranges: Ranges, links: Indices) -> HeardRound:
+def _heard(plan: RoundPlan, number: int, ranges: Ranges) -> HeardRound:
     tried = np.flatnonzero(plan.tried[number])
+    links = number * plan.which.shape[1] + tried
+    samples = None if ranges.exchanges is None else ranges.exchanges.reception.samples[links]
     return HeardRound(
         int(plan.stamp_ns[number]),
         plan.tag_m[number],
         plan.which[number, tried],
-        plan.ways.distance_m[number * plan.which.shape[1] + tried],
+        plan.ways.distance_m[links],
         ranges.range_m[links],
         ranges.level_bias_m[links],
         ranges.link_class[links],
         _receptions(ranges, links.tolist()),
-        ranges.exchanges,
+        samples,
     )
 
 
