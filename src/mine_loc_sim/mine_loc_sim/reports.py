@@ -15,7 +15,7 @@ from mine_loc_sim.scene import SceneOptions, reporting_lines, wire_format
 from mine_loc_sim.tag_radio import CHANNEL, PRF_MHZ, HeardRound
 from mine_loc_sim.tdoa_blink import AnchorSync, range_differences
 from mine_loc_uwb.ranging import CirWindow, Range, RangingRound, TdoaBlink, TdoaDifference
-from mine_loc_uwb.received_power import powers_dbm
+from mine_loc_uwb.received_power import Reception, powers_dbm
 
 _TICKS_PER_US = 63_897.6
 _COUNTER = 1 << 40
@@ -27,6 +27,17 @@ class ReportedRound:
 
     ranging: RangingRound
     heard: HeardRound
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedCir:
+    """An accumulator with the registers that the wire carries beside it."""
+
+    window: CirWindow
+    reception: Reception
+
+
+Report = ReportedRound | ReportedCir | TdoaBlink
 
 
 class UwbClock:
@@ -67,7 +78,7 @@ class Reporters:
         self._rounds = {tag: int(self._rng.integers(2**16)) for tag in tagged}
         self._lines = {tag: reporting_lines(site, tag) for tag in tagged}
 
-    def report(self, person: Person, heard: HeardRound) -> Iterator[tuple[str, ReportedRound | CirWindow | TdoaBlink]]:
+    def report(self, person: Person, heard: HeardRound) -> Iterator[tuple[str, Report]]:
         """Yield what is said of a round, with the line that says it; nothing of a round that is lost on its way."""
         tag_id = person.tag_id
         self._rounds[tag_id] = (self._rounds[tag_id] + 1) % 2**32
@@ -135,14 +146,14 @@ class Reporters:
         return self._sync.advance(gone_s)
 
 
-def _windows(ranging: RangingRound, heard: HeardRound) -> Iterator[CirWindow]:
+def _windows(ranging: RangingRound, heard: HeardRound) -> Iterator[ReportedCir]:
     """Whole accumulators of the exchanges that succeeded."""
     assert heard.accumulators is not None
     for number, (measured, reception) in enumerate(zip(ranging.ranges, heard.receptions, strict=True)):
         if not reception.preamble_count:
             continue
         samples = heard.accumulators[number]
-        yield CirWindow(
+        window = CirWindow(
             tag_id=ranging.tag_id,
             anchor_id=measured.anchor_id,
             seq=ranging.seq or 0,
@@ -161,3 +172,4 @@ def _windows(ranging: RangingRound, heard: HeardRound) -> Iterator[CirWindow]:
             first_path_power_dbm=measured.first_path_power_dbm,
             receive_power_dbm=measured.receive_power_dbm,
         )
+        yield ReportedCir(window, reception)

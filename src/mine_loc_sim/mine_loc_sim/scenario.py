@@ -20,19 +20,18 @@ from mine_loc_sim.magnetic_field import GalleryField
 from mine_loc_sim.mine import Mine
 from mine_loc_sim.n100_device import N100Device, mounted
 from mine_loc_sim.ranging_link import Radios
-from mine_loc_sim.reports import ReportedRound, Reporters
+from mine_loc_sim.reports import Report, Reporters
 from mine_loc_sim.route import plan_route
 from mine_loc_sim.route_network import RouteNetwork
 from mine_loc_sim.scene import SceneOptions, anchor_places_m, check_formats, line_of
 from mine_loc_sim.site_mine import mine_of, vehicle_prism
 from mine_loc_sim.tag_radio import HeardRound, RoundPlan, TagRadio, shortest_ways
 from mine_loc_sim.walker import TrueStep, TrueTurn, Walker
-from mine_loc_uwb.ranging import CirWindow, TdoaBlink
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 _CROWD_STEP_NS = NS_PER_S // 10
-Frame = ReportedRound | CirWindow | TdoaBlink | ImuFrame | AhrsFrame
+Frame = Report | ImuFrame | AhrsFrame
 Timed = tuple[int, Frame]
 
 
