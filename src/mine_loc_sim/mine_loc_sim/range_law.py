@@ -37,6 +37,7 @@ from mine_loc_sim.wearer import Wearer, body_process
 _DISTANCE_M = np.array([1.0, 2.5, 6.0, 15.0, 35.0, 80.0])
 _LOSS_DB = np.array([5.0, 10.0, 18.0, 30.0, 60.0])
 _DETOUR_M = np.array([0.0, 0.1, 0.5, 2.0, 8.0])
+_SCATTERED_SLOPE_DB = 10.0 * constants.CM8.path_loss_exponent
 _ENTRIES = 32
 _REPEATED = 8
 _FADED_MOVE_M = 4.0 * constants.FADING_LENGTH_M
@@ -52,6 +53,7 @@ class RangeLaw:
     receive_power_dbm: Reals
     first_path_power_dbm: Reals
     white_sd_m: Reals  # (cells,), of ranges between ends at rest
+    detour_m: Reals  # (cells,), that the errors were found with
     kept: float  # rank correlation of a link's error when only its fading has changed
 
 
@@ -61,10 +63,9 @@ def cell_of(way: Obstruction) -> Indices:
     detour_m = np.minimum(way.detour_m, _DETOUR_M[-1])
     loss = np.where(way.sealed, len(_LOSS_DB), _nearest(_LOSS_DB, way.loss_db))
     kind = np.where(way.loss_db > 0.0, 1 + loss * len(_DETOUR_M) + _nearest(_DETOUR_M + 0.05, detour_m + 0.05), 0)
-    further = 10.0 ** (way.further_loss_db / 21.5)
-    distance_m = np.where(
-        way.sealed & np.isfinite(way.detour_m), (way.distance_m + detour_m) * further - detour_m, way.distance_m
-    )
+    further = 10.0 ** (way.further_loss_db / _SCATTERED_SLOPE_DB)
+    reach_m = (way.distance_m + detour_m) * further - detour_m
+    distance_m = np.where(way.sealed & np.isfinite(way.detour_m), reach_m, way.distance_m)
     return _nearest(_DISTANCE_M, distance_m) * kinds + kind
 
 
@@ -109,6 +110,7 @@ def range_law(environment: Environment) -> RangeLaw:
         receive_power_dbm=sorted_entries(draw.registers.receive_power_dbm for draw in draws),
         first_path_power_dbm=sorted_entries(draw.registers.first_path_power_dbm for draw in draws),
         white_sd_m=_white_sd(error_m[:, :_REPEATED] - np.stack(again, axis=1)),
+        detour_m=way.detour_m,
         kept=_rank_correlation(error_m[:, :_REPEATED], np.stack(faded, axis=1)),
     )
 
@@ -167,16 +169,11 @@ class FastTagLinks:
         law, link_class = self._law, self._law.link_class[cell, entry]
         by_level_m = level_bias_m(law.level_dbm[cell, entry])
         direct = link_class > 1
-        closed = way.sealed & np.isinf(way.detour_m)
-        range_m = (
-            np.where(closed, np.nan, way.distance_m)
-            + law.error_m[cell, entry]
-            + np.where(direct, way.delay_m, 0.0)
-            + by_level_m
-        )
+        range_m = way.distance_m + law.error_m[cell, entry] + np.where(direct, way.delay_m, 0.0) + by_level_m
+        range_m += np.where(way.sealed, way.detour_m - law.detour_m[cell], 0.0)  # inf = no way at all
         range_m += constants.SLOW_BIAS_SD_M * self._bias.walk(which, moved_m) + self._offset_m[which.ravel()]
-        range_m += law.white_sd_m[cell] * self._rng.standard_normal(len(cell)) - early_false_paths_m(
-            len(cell), self._rng
-        )
+        range_m += law.white_sd_m[cell] * self._rng.standard_normal(len(cell))
+        range_m -= early_false_paths_m(len(cell), self._rng)
         powers = law.receive_power_dbm[cell, entry], law.first_path_power_dbm[cell, entry]
+        range_m[np.isinf(range_m)] = np.nan
         return Ranges(np.isfinite(range_m), range_m, by_level_m, link_class, *powers, None)
