@@ -54,12 +54,15 @@ class RouteNetwork:
     def _network_walk(self, rng: np.random.Generator, length_m: float) -> list[WayPoint]:
         pairs = [(a, b) for a, others in self._joined.items() for b in others]
         lengths = np.array([np.linalg.norm(self._nodes[a] - self._nodes[b]) for a, b in pairs])
-        last, goal = pairs[rng.choice(len(pairs), p=lengths / lengths.sum())]
-        here = self._beside(rng, last, goal, rng.uniform(0.1, 0.9))
+        for _ in range(_TRIES):
+            last, goal = pairs[rng.choice(len(pairs), p=lengths / lengths.sum())]
+            here = self._beside(rng, last, goal, rng.uniform(0.1, 0.9))
+            if not self._inside_obstacle(here):
+                break
         points, walked, refused = [WayPoint(_point(here), pause_s=_first_pause(rng))], 0.0, 0
         while walked < length_m:
-            half_way = rng.random() < sc.TURN_BACK_SHARE
-            there = self._beside(rng, last, goal, rng.uniform(0.3, 0.7) if half_way else 1.0)
+            half_way = rng.random() < sc.TURN_BACK_SHARE or refused > 1
+            there = self._beside(rng, last, goal, rng.uniform(0.0, 1.0) if half_way else 1.0)
             step_m = float(np.linalg.norm(there - here))
             if step_m < _SHORTEST_LEG_M or self._blocked(here, there):
                 refused += 1

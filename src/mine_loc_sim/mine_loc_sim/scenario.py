@@ -23,7 +23,7 @@ from mine_loc_sim.ranging_link import Radios
 from mine_loc_sim.reports import Report, Reporters
 from mine_loc_sim.route import plan_route
 from mine_loc_sim.route_network import RouteNetwork
-from mine_loc_sim.scene import SceneOptions, anchor_places_m, check_formats, line_of
+from mine_loc_sim.scene import SceneOptions, anchor_places_m, check_formats, line_names, line_of
 from mine_loc_sim.site_mine import mine_of, vehicle_prism
 from mine_loc_sim.tag_radio import HeardRound, RoundPlan, TagRadio, shortest_ways
 from mine_loc_sim.walker import TrueStep, TrueTurn, Walker
@@ -90,7 +90,7 @@ class Scenario:
     def __init__(self, site: Site, people: Sequence[Person], options: SceneOptions) -> None:
         check_formats(site)
         self.site, self.people, self.options = site, tuple(people), options
-        self.lines = tuple(r.name for r in site.uwb_receivers) + tuple(line_of(p) for p in people if p.n100)
+        self.lines = line_names(site, people)
         seeds = np.random.SeedSequence(options.seed).spawn(3 + len(people))
         self._mine = _with_vehicles(site)
         self._anchors_m = anchor_places_m(site)

@@ -1,7 +1,7 @@
 """A scene: who walks where in a site with which devices, drawn from a site, people and a seed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import N100, Person, Stride
 from mine_loc_core.site import Anchor, Site, UwbReceiver, Vehicle
-from mine_loc_core.stamps import to_ns
 from mine_loc_sim.radio_constants import INDUSTRIAL, Environment
 from mine_loc_sim.route import WayPoint
 
@@ -52,6 +51,11 @@ class SceneOptions:
 def line_of(person: Person) -> str:
     """Name of the line of a person's N100."""
     return f"{person.name}/n100"
+
+
+def line_names(site: Site, people: Sequence[Person]) -> tuple[str, ...]:
+    """Names of all lines of a site and its people."""
+    return tuple(r.name for r in site.uwb_receivers) + tuple(line_of(p) for p in people if p.n100)
 
 
 def anchor_places_m(site: Site) -> NDArray[np.float64]:
@@ -119,9 +123,3 @@ def check_formats(site: Site) -> None:
 def wire_format(receiver: UwbReceiver) -> str:
     """Return the format that the emulator of this receiver speaks: its own, mine_loc where the driver is to detect it."""
     return "mine_loc" if receiver.format == "auto" else receiver.format
-
-
-def moved(options: SceneOptions, anchor_id: int, start_s: float, stop_s: float, shift_m: tuple[float, float, float]) -> SceneOptions:
-    """Add a moved anchor to a scene's options."""
-    away = MovedAnchor(anchor_id, to_ns(start_s), to_ns(stop_s), shift_m)
-    return replace(options, moved_anchors=(*options.moved_anchors, away))
