@@ -16,7 +16,7 @@ from enum import Enum
 FIRST_DELAY_S = 0.1
 LONGEST_DELAY_S = 10.0
 HEALTHY_S = 30.0  # a process that ran this long starts its back-off afresh
-PATIENCE_S = 1.5  # between SIGINT and SIGKILL
+PATIENCE_S = 1.5  # between SIGTERM and SIGKILL
 _LAST_WORDS_S = 0.2  # for output still in the pipe; longer only if somebody left the group and holds it open
 _LONGEST_LINE = 1 << 16
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -28,7 +28,7 @@ class EventKind(Enum):
 
     STARTED = "started"
     DIED = "died"  # on its own; it will be restarted
-    STOPPED = "stopped"  # as asked, by SIGINT
+    STOPPED = "stopped"  # as asked, by SIGTERM
     KILLED = "killed"  # as asked, but it needed SIGKILL
     FAILED = "failed"  # could not be executed; it will be tried again
 
@@ -139,7 +139,7 @@ class Supervisor:
         await asyncio.wait({exited, asked}, return_when=asyncio.FIRST_COMPLETED)
         kind = EventKind.STOPPED if stop.is_set() else EventKind.DIED
         if not exited.done():
-            _signal_group(process.pid, signal.SIGINT)
+            _signal_group(process.pid, signal.SIGTERM)  # SIGINT would print a traceback where Python is still importing
             await asyncio.wait({exited}, timeout=PATIENCE_S)
             kind = EventKind.STOPPED if exited.done() else EventKind.KILLED
         asked.cancel()

@@ -38,7 +38,7 @@ def align(times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, 
     """The offset within ± `search_s` and the transform with the least RMS distance.
 
     `track_m` is (n, 2) at `times_s`, `truth_m` (m, 2) at `truth_times_s`, which increase. Instants without truth are
-    left out; an offset that leaves less than half of them is not considered.
+    left out; an offset that leaves less than half of them is not considered. Raises ValueError when none is left.
     """
 
     def fit(offset_s: float) -> tuple[float, float, Array]:
@@ -51,19 +51,21 @@ def align(times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, 
         return float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))), yaw, shift
 
     step_s = 0.05
-    grid = np.arange(-search_s, search_s + step_s, step_s)
+    grid = np.linspace(-search_s, search_s, 2 * round(search_s / step_s) + 1)
     coarse_s = float(grid[np.argmin([fit(offset)[0] for offset in grid])])
-    result = minimize_scalar(
-        lambda offset: fit(offset)[0], bounds=(coarse_s - step_s, coarse_s + step_s), method="bounded"
-    )
-    offset_s = float(result.x)
+    if not np.isfinite(fit(coarse_s)[0]):
+        raise ValueError(f"truth covers less than half of the track at every time offset within ± {search_s:g} s")
+    bounds = (max(coarse_s - step_s, -search_s), min(coarse_s + step_s, search_s))
+    offset_s = float(minimize_scalar(lambda offset: fit(offset)[0], bounds=bounds, method="bounded").x)
     _, yaw, shift = fit(offset_s)
     return Alignment(offset_s, yaw, shift)
 
 
 def truth_at(times_s: Array, truth_times_s: Array, truth_m: Array) -> Array:
-    """Truth (n, 2) interpolated to `times_s`."""
-    return np.column_stack([np.interp(times_s, truth_times_s, truth_m[:, axis]) for axis in range(2)])
+    """Truth (n, 2) interpolated to `times_s`, NaN before its start and after its end."""
+    return np.column_stack(
+        [np.interp(times_s, truth_times_s, truth_m[:, axis], left=np.nan, right=np.nan) for axis in range(2)]
+    )
 
 
 def _rotation(yaw: float) -> Array:

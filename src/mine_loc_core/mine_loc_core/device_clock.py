@@ -19,6 +19,7 @@ _STEP_NS = 500 * NS_PER_MS  # beyond the stalls of a Wi-Fi bridge (hardware.md A
 _STEP_CONFIRM_NS = 700 * NS_PER_MS
 _HOLDOVER_DELAY_NS = 50 * NS_PER_MS
 _HOLDOVER_AFTER_NS = 5 * NS_PER_S
+_DEVICE_EPOCH_NS = 1 << 62  # device time counts modulo 146 years, which keeps offsets within the messages' int64
 
 
 class SyncState(IntEnum):
@@ -63,7 +64,8 @@ class DeviceClock:
 
     def _forget(self) -> None:
         self._last_ticks: int | None = None
-        self._ticks = 0
+        self._ticks = 0  # since the first event, so that large counters do not cost precision
+        self._first_ns = 0
         self._last_arrival_ns = 0
         self._bins: deque[tuple[int, int]] = deque(maxlen=_WINDOW_BINS)  # (device ns, arrival − device ns) minima
         self._line = (0, 0, 0.0)  # (device ns, difference ns there, slope)
@@ -78,29 +80,33 @@ class DeviceClock:
         if ticks is None or self._bypass:
             return DeviceStamp(arrival_ns - self._latency_ns, 0, 0.0, SyncState.FREE_RUNNING)
         reset = self._unwrap(ticks, arrival_ns)
-        device_ns = round(self._ticks * self._tick_ns)
-        if not reset and self._stepped(device_ns, arrival_ns):
+        device_ns = self._device_ns
+        if not reset and (arrival_ns < (self._last_stamp_ns or 0) or self._stepped(device_ns, arrival_ns)):
             reset = "step"
         if reset:
             self.resets += 1
             self._forget()
             self._unwrap(ticks, arrival_ns)
-            device_ns = round(self._ticks * self._tick_ns)
+            device_ns = self._device_ns
             self._last_stamp_ns = None
         self._observe(device_ns, arrival_ns - device_ns)
         offset_ns = self._difference_at(device_ns)
         stamp_ns = min(device_ns + offset_ns, arrival_ns) - self._latency_ns
         if self._last_stamp_ns is not None:
-            stamp_ns = min(max(stamp_ns, self._last_stamp_ns + 1), max(arrival_ns, self._last_stamp_ns + 1))
+            stamp_ns = max(stamp_ns, self._last_stamp_ns)
         self._last_stamp_ns = stamp_ns
         return DeviceStamp(
             stamp_ns, offset_ns, self._line[2] * 1e6, self._state(arrival_ns - device_ns, offset_ns, arrival_ns), reset
         )
 
+    @property
+    def _device_ns(self) -> int:
+        return self._first_ns + round(self._ticks * self._tick_ns)
+
     def _unwrap(self, ticks: int, arrival_ns: int) -> str:
         """Extend the counter past its width; answers why the device must have restarted, or nothing."""
         if self._last_ticks is None:
-            self._ticks = ticks
+            self._first_ns = round(ticks * self._tick_ns) % _DEVICE_EPOCH_NS
         else:
             forward = (ticks - self._last_ticks) % self._modulus
             elapsed = (arrival_ns - self._last_arrival_ns) / self._tick_ns

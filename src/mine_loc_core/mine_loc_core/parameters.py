@@ -4,7 +4,7 @@
     class SolverParameters:
         gate: float = parameter(0.99, "probability that a good range passes", unit="1", low=0.5, high=0.9999)
 
-A node declares them with their descriptors (`mine_loc_core.nodes.lifecycle`), `mine-loc up` checks parameter files
+A node declares them with their descriptors (`mine_loc_core.nodes.node_base`), `mine-loc up` checks parameter files
 against them before anything starts.
 """
 
@@ -39,12 +39,15 @@ class Constraint:
             return "any value of its type"
         low = "-inf" if self.low is None else f"{self.low:g}"
         high = "inf" if self.high is None else f"{self.high:g}"
-        return f"{low} to {high} {self.unit}".rstrip()
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{low} to {high}{unit}".rstrip()
 
     def admits(self, value: Any) -> bool:
-        """Whether a value of the right type lies within the constraint (NaN never does)."""
+        """Whether a value of the right type lies within the constraint (NaN and more than ROS's 64 bits never do)."""
         if self.choices:
             return value in self.choices
+        if isinstance(value, int) and not -(2**63) <= value < 2**63:
+            return False
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             if math.isnan(value):
                 return False
@@ -91,7 +94,7 @@ def from_mapping(kind: type[P], values: Mapping[str, Any], where: str = "paramet
 
 
 def _checked(where: str, value: Any, kind: type, constraint: Constraint) -> Any:
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+    if kind is float and isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63:
         value = float(value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise ConfigurationError(

@@ -8,6 +8,7 @@ import glob
 import os
 import random
 import select
+import termios
 import threading
 import time
 from collections import deque
@@ -21,6 +22,7 @@ _POLL_S = 0.2
 _FIRST_RETRY_S = 0.2
 _LAST_RETRY_S = 2.0
 _QUEUE_CHUNKS = 1024
+_FAILURES = (OSError, ValueError, termios.error)  # of a port that is missing, busy, or goes while it is set up
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,8 @@ class SerialLink:
         self._wake = wake
         self._silence_s = silence_s
         self._queue: deque[Chunk] = deque()
+        self._queue_lock = threading.Lock()
+        self._port_lock = threading.Lock()
         self._stop = threading.Event()
         self._port: serial.SerialBase | None = None
         self._name = ""
@@ -74,24 +78,25 @@ class SerialLink:
     def stop(self) -> None:
         """Stop reading and close the port; returns within a second."""
         self._stop.set()
-        self._thread.join(timeout=1.0)
+        if self._thread.is_alive():
+            self._thread.join(timeout=1.0)
 
     def take(self) -> list[Chunk]:
         """All chunks since the last call, in order."""
-        chunks = []
-        while self._queue:
-            chunks.append(self._queue.popleft())
+        with self._queue_lock:
+            chunks = list(self._queue)
+            self._queue.clear()
         return chunks
 
     def write(self, data: bytes) -> None:
         """Send bytes to the device; a line that is down swallows them, as unplugged cables do."""
-        port = self._port
-        if port is None or not data:
-            return
-        try:
-            port.write(data)
-        except (OSError, serial.SerialException) as error:
-            self._error = str(error)
+        with self._port_lock:
+            if self._port is None or not data:
+                return
+            try:
+                self._port.write(data)
+            except _FAILURES as error:
+                self._error = str(error)
 
     @property
     def status(self) -> LinkStatus:
@@ -113,7 +118,7 @@ class SerialLink:
         for name in self._candidates():
             try:
                 self._port = serial.serial_for_url(name, self._baud, timeout=0, write_timeout=1.0, exclusive=True)
-            except (OSError, ValueError, serial.SerialException) as error:
+            except _FAILURES as error:
                 self._error = str(error)
                 continue
             self._name, self._error = name, ""
@@ -133,8 +138,8 @@ class SerialLink:
 
     def _read_until_it_fails(self) -> None:
         assert self._port is not None
-        descriptor = self._port.fileno()
         try:
+            descriptor = self._port.fileno()
             while not self._stop.is_set():
                 if not select.select([descriptor], [], [], _POLL_S)[0]:
                     if time.monotonic() - self._last_heard > self._silence_s:
@@ -147,17 +152,19 @@ class SerialLink:
                     return
                 self._last_heard = time.monotonic()
                 self._put(data)
-        except (OSError, ValueError) as error:
+        except _FAILURES as error:
             self._error = str(error)
 
     def _put(self, data: bytes) -> None:
         self._bytes_read += len(data)
-        if len(self._queue) >= _QUEUE_CHUNKS:
-            self._bytes_dropped += len(self._queue.popleft().data)
-        self._queue.append(Chunk(self._clock(), data))
+        with self._queue_lock:
+            if len(self._queue) >= _QUEUE_CHUNKS:
+                self._bytes_dropped += len(self._queue.popleft().data)
+            self._queue.append(Chunk(self._clock(), data))
         self._wake()
 
     def _close(self) -> None:
-        port, self._port, self._name = self._port, None, ""
-        if port is not None:
-            port.close()
+        with self._port_lock:
+            port, self._port, self._name = self._port, None, ""
+            if port is not None:
+                port.close()

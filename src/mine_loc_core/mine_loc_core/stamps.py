@@ -11,5 +11,5 @@ def to_ns(seconds: float) -> int:
 
 
 def to_s(nanoseconds: int) -> float:
-    """Nanoseconds to seconds; exact to the nanosecond for durations below 104 days."""
+    """Nanoseconds to seconds; exact to the nanosecond for durations below 48 days."""
     return nanoseconds / NS_PER_S

@@ -2,7 +2,7 @@
 
 A frame is `FC type length sn crc8(first four) crc16_high crc16_low payload FD`, with the payload little-endian and
 CRC-16/XMODEM over the payload alone; a frame of length zero ends after its CRC-8. The format and its public sources
-are described in docs/fdilink.md. All values keep the device's units and axes: `mine_loc_pdr.n100_axes` converts.
+are described in docs/wire-formats.md. All values keep the device's units and axes: `mine_loc_pdr.n100_axes` converts.
 """
 
 import binascii

@@ -1,6 +1,6 @@
 """From the N100's axes and units to those of ROS: REP 103 (FLU body, ENU world, SI) and REP 145 (specific force).
 
-The device speaks forward-right-down in the body and north-east-down in the world (docs/fdilink.md).
+The device speaks forward-right-down in the body and north-east-down in the world (docs/wire-formats.md).
 """
 
 import math

@@ -16,7 +16,7 @@ from mine_loc_bringup.supervisor import Backoff, Event, EventKind, Supervisor
 
 DEADLINE_S = 20.0
 OBEDIENT = "print('ready'); import time; time.sleep(600)"
-STUBBORN = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('ready'); time.sleep(600)"
+STUBBORN = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('ready'); time.sleep(600)"
 CRASHING = "import sys; print('oh no', file=sys.stderr); sys.exit(3)"
 
 

@@ -47,6 +47,7 @@ class NodeBase(LifecycleNode):
         self.active = False
         self.parameters = self._declare_parameters()
         self.add_on_set_parameters_callback(self._on_set_parameters)
+        self._made: dict[Any, Callable[[Any], Any]] = {}  # what `configure` created, and how to destroy it
         self._faults: dict[str, int] = {}
         self._last_fault = ""
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -88,15 +89,21 @@ class NodeBase(LifecycleNode):
 
     def publish_to(self, kind: type, topic: str, qos: QoSProfile) -> Any:
         """A publisher that is silent while the node is inactive."""
-        return self.create_lifecycle_publisher(kind, topic, qos)
+        publisher = self.create_lifecycle_publisher(kind, topic, qos)
+        if self.active:  # it missed the transition
+            publisher.on_activate(None)
+        return self._keep(publisher, self.destroy_lifecycle_publisher)
 
     def subscribe(self, kind: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile) -> Any:
         """A subscription that is heard while the node is active."""
-        return self.create_subscription(kind, topic, self.guarded(callback, topic), qos)
+        return self._keep(
+            self.create_subscription(kind, topic, self.guarded(callback, topic), qos), self.destroy_subscription
+        )
 
     def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """A timer of steady time that runs while the node is active."""
-        return self.create_timer(period_s, self.guarded(callback, callback.__name__), clock=self._steady)
+        timer = self.create_timer(period_s, self.guarded(callback, callback.__name__), clock=self._steady)
+        return self._keep(timer, self.destroy_timer)
 
     def serve(self, kind: type, name: str, answer: Callable[[Any], tuple[bool, str]]) -> Any:
         """A service whose response carries `success` and `reason`."""
@@ -111,7 +118,16 @@ class NodeBase(LifecycleNode):
                 response.success, response.reason = False, repr(error)
             return response
 
-        return self.create_service(kind, name, callback)
+        return self._keep(self.create_service(kind, name, callback), self.destroy_service)
+
+    def release(self, *entities: Any) -> None:
+        """Destroy publishers, subscriptions, timers or services that the methods above made."""
+        for entity in entities:
+            self._made.pop(entity)(entity)
+
+    def _keep(self, entity: Any, destroy: Callable[[Any], Any]) -> Any:
+        self._made[entity] = destroy
+        return entity
 
     def guarded(self, callback: Callable[..., None], name: str) -> Callable[..., None]:
         """The callback, silent while inactive, its exceptions reported instead of raised."""
@@ -131,6 +147,7 @@ class NodeBase(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lifecycle transition: `configure`."""
         if not self._transition(self.configure):
+            self.release(*self._made)
             return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
 
@@ -149,6 +166,11 @@ class NodeBase(LifecycleNode):
         self._transition(self.deactivate)
         return super().on_deactivate(state)
 
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Lifecycle transition: release what `configure` created, which will create it anew."""
+        self.release(*self._made)
+        return super().on_cleanup(state)
+
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lifecycle transition: deactivate if need be."""
         if self.active:
@@ -159,13 +181,10 @@ class NodeBase(LifecycleNode):
         try:
             step()
         except MineLocError as error:
-            self.transition_error = str(error)
             self.get_logger().error(str(error))
         except Exception as error:  # noqa: BLE001 see above
-            self.transition_error = repr(error)
             self._fault(step.__name__, error)
         else:
-            self.transition_error = ""
             return True
         return False
 
@@ -274,8 +293,7 @@ def run(node_class: Callable[[], NodeBase]) -> int:
     try:
         node = node_class()
         if node.parameters.autostart and not _start(node):
-            print(f"{node.get_name()}: {node.transition_error}", file=sys.stderr)
-            return 2
+            return 2  # the transition has logged why
         executor = SingleThreadedExecutor() if node.needs_guard_condition else EventsExecutor()
         executor.add_node(node)
         while not stopping.is_set():  # not spin(): the events executor's burns a core and never returns (rclpy 7.1.6)

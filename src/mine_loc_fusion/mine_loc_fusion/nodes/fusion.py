@@ -75,7 +75,7 @@ class Fusion(NodeBase):
         people = self._people.people
         for name in [name for name in self._tracked if people.by_name(name) is None]:
             del self._tracked[name]
-            self.destroy_lifecycle_publisher(self._pose_publishers.pop(name))
+            self.release(self._pose_publishers.pop(name))
         for person in people:
             tracked = self._tracked.get(person.name)
             if tracked is None:
@@ -83,10 +83,8 @@ class Fusion(NodeBase):
             else:
                 tracked.person = person
             if person.name not in self._pose_publishers:
-                publisher = self.publish_to(PoseWithCovarianceStamped, f"people/{person.name}/pose", EVENTS)
-                if self.active:
-                    publisher.on_activate(None)
-                self._pose_publishers[person.name] = publisher
+                topic = f"people/{person.name}/pose"
+                self._pose_publishers[person.name] = self.publish_to(PoseWithCovarianceStamped, topic, EVENTS)
 
     def _on_epoch(self, epoch: msg.Epoch) -> None:
         tracked = self._tracked.get(epoch.person)

@@ -93,8 +93,7 @@ class Pdr(NodeBase):
         wearers = {person.name: person for person in people if person.n100}
         for name, track in list(self._tracks.items()):
             if wearers.get(name) != track.person:
-                self.destroy_subscription(track.subscription)
-                self.destroy_publisher(track.odometry)
+                self.release(track.subscription, track.odometry)
                 del self._tracks[name]
         for name, person in wearers.items():
             if name not in self._tracks and person.n100:
@@ -103,8 +102,6 @@ class Pdr(NodeBase):
     def _new_track(self, person: Person, n100: N100) -> Track:
         track = Track(person, n100)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
-        if self.active:
-            track.odometry.on_activate(None)  # publishers made now missed the transition
         track.subscription = self.subscribe(
             Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM
         )

@@ -30,6 +30,7 @@ class Dwm1000Driver(NodeBase):
 
     def __init__(self) -> None:
         super().__init__("dwm1000_driver")
+        self._arrived = self.create_guard_condition(self.guarded(self._read, "serial data"))
 
     def configure(self) -> None:
         """Create publishers; nothing is opened yet. A receiver that site.yaml does not know refuses the transition."""
@@ -38,7 +39,6 @@ class Dwm1000Driver(NodeBase):
         self._tdoa = self.publish_to(TdoaArray, "uwb/tdoa", EVENTS)
         self._cir = self.publish_to(CirFrame, "uwb/cir", EVENTS)
         self._info = self.publish_to(DeviceInfo, "~/device_info", LATCHED)
-        self._arrived = self.create_guard_condition(self.guarded(self._read, "serial data"))
         self.every(0.05, self._talk)
 
     def activate(self) -> None:

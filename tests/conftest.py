@@ -1,0 +1,25 @@
+"""What tests of live nodes share."""
+
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from graph.domains import lent_domain  # noqa: E402
+from graph.observer import Observer  # noqa: E402
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A ROS domain of the test's own."""
+    with lent_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def observer(domain: int) -> Iterator[Observer]:
+    """An observer on that domain."""
+    observer = Observer(domain)
+    yield observer
+    observer.close()

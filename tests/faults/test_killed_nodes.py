@@ -1,0 +1,66 @@
+"""`kill -9` of each node in turn: it is back, and the people are positioned again, within three seconds."""
+
+import signal
+import time
+from collections.abc import Iterator
+
+import pytest
+from mine_loc_interfaces.msg import Epoch, PersonPose, PersonPoseArray, UwbPose, UwbRangeArray
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
+
+from graph.live_graph import LiveGraph, live_graph
+from graph.observer import Heard
+from mine_loc_core.nodes.qos import STREAM
+
+pytestmark = pytest.mark.graph
+
+OUTPUT_OF = {
+    "dwm1000_driver_gate": (UwbRangeArray, "uwb/ranges", 100),
+    "uwb_solver": (UwbPose, "uwb/pose", 100),
+    "n100_driver": (Imu, "walker/imu/data", STREAM),
+    "pdr": (Odometry, "walker/odometry", 100),
+    "synchroniser": (Epoch, "sync/epochs", 100),
+    "fusion": (PersonPoseArray, "fused/poses", 100),
+}
+
+
+@pytest.fixture(scope="module")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveGraph]:
+    with live_graph(tmp_path_factory.mktemp("killed")) as running_graph:
+        yield running_graph
+
+
+@pytest.fixture(scope="module")
+def heard(graph: LiveGraph) -> dict[str, Heard]:
+    return {node: graph.observer.listen(*what) for node, what in OUTPUT_OF.items()}
+
+
+@pytest.mark.parametrize("node", OUTPUT_OF)
+def test_output_continues_within_three_seconds_of_the_kill(graph, heard, node, record_property):
+    observer, poses, own = graph.observer, heard["fusion"], heard[node]
+    for name, topic in heard.items():
+        before = len(topic)
+        observer.wait_for(lambda t=topic, n=before: len(t) > n + 3, what=f"output of {name}")
+    victim = graph.up.node_process(node)
+    killed_s = time.monotonic()
+    victim.send_signal(signal.SIGKILL)
+    observer.wait_for(lambda: f"{node}] died, signal 9" in graph.up.output, what="the supervisor's word of it")
+    died_s = time.monotonic()
+
+    def positioned_by_uwb() -> bool:
+        return any(
+            item.person == "walker" and item.mode in {PersonPose.UWB_PDR, PersonPose.UWB_ONLY}
+            for array in poses.since(died_s)
+            for item in array.people
+        )
+
+    observer.wait_for(lambda: own.since(died_s) and positioned_by_uwb())
+    recovered_s = time.monotonic() - killed_s
+    arrivals = [killed_s, *(at_s for at_s in poses.at_s if at_s > killed_s)]
+    gap_s = max(later - earlier for earlier, later in zip(arrivals, arrivals[1:], strict=False))
+    record_property("recovered_s", round(recovered_s, 2))
+    print(f"{node}: its output back after {recovered_s:.2f} s, longest gap of fused/poses {gap_s:.2f} s")
+    assert recovered_s < 3.0
+    assert gap_s < 3.0
+    assert graph.up.node_process(node).pid != victim.pid
