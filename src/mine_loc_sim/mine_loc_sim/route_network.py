@@ -152,7 +152,8 @@ class RouteNetwork:
         room = ConvexPrisms.of([Prism(polygon_m, floor_m - 1.0, floor_m + 1.0)])
         middle = np.append(polygon_m.mean(axis=0), floor_m)
         inward = [place + 0.02 * (middle - place) for place in self._nodes]
-        ends = [number for number, place in enumerate(inward) if contains(room, place[None])[0]]
+        dead_ends = [number for number in range(len(self._nodes)) if len(self._joined.get(number, ())) == 1]
+        ends = [number for number in dead_ends if contains(room, inward[number][None])[0]]
         free = [self._free_place(room, polygon_m, middle, self._nodes[end]) for end in ends]
         for end, place in zip(ends, free, strict=True):
             if place is not None:
