@@ -57,8 +57,10 @@ class RouteNetwork:
         for _ in range(_TRIES):
             last, goal = pairs[rng.choice(len(pairs), p=lengths / lengths.sum())]
             here = self._beside(rng, last, goal, rng.uniform(0.1, 0.9))
-            if not self._inside_obstacle(here):
+            if not self._crowded(here):
                 break
+        else:
+            raise ConfigurationError("galleries: no place free of obstacles was found; allowed: room to walk")
         points, walked, refused = [WayPoint(_point(here), pause_s=_first_pause(rng))], 0.0, 0
         while walked < length_m:
             half_way = rng.random() < sc.TURN_BACK_SHARE or refused > 1
@@ -81,24 +83,27 @@ class RouteNetwork:
         return int(rng.choice(onward)) if onward else last
 
     def _beside(self, rng: np.random.Generator, start: int, goal: int, share: float) -> Array:
-        """Return a place that share of the way from one node to the other, somewhat off the middle."""
-        middle = (1.0 - share) * self._nodes[start] + share * self._nodes[goal]
-        room_m = min(self._room_m[start], self._room_m[goal])
-        angle = rng.uniform(-math.pi, math.pi)
-        place: Array = middle + room_m * math.sqrt(rng.random()) * np.array([math.cos(angle), math.sin(angle), 0.0])
+        """Return a place that share of the way from one node to the other, somewhat to the side, before a dead end."""
+        way = self._nodes[goal] - self._nodes[start]
+        length_m = float(np.linalg.norm(way))
+        if len(self._joined[goal]) == 1:
+            share = min(share, 1.0 - sc.CLEARANCE_M / length_m)
+        aside_m = rng.uniform(-1.0, 1.0) * min(self._room_m[start], self._room_m[goal])
+        place: Array = self._nodes[start] + share * way + aside_m / length_m * np.array([-way[1], way[0], 0.0])
         return place
 
     def _open_walk(self, rng: np.random.Generator, length_m: float) -> list[WayPoint]:
         assert self._box_m is not None
         low, high = self._box_m
         here = np.append(rng.uniform(low, high), 0.0)
-        while self._inside_obstacle(here):
+        while self._crowded(here):
             here = np.append(rng.uniform(low, high), 0.0)
         points, walked = [WayPoint(_point(here), pause_s=_first_pause(rng))], 0.0
-        shortest_m = min(sc.OPEN_LEG_M[0], 0.3 * float(np.linalg.norm(high - low)))
+        diagonal_m = float(np.linalg.norm(high - low))
+        legs_m = min(sc.OPEN_LEG_M[0], 0.3 * diagonal_m), min(sc.OPEN_LEG_M[1], 0.7 * diagonal_m)
         while walked < length_m:
             for _ in range(_TRIES):
-                angle, leg_m = rng.uniform(-math.pi, math.pi), rng.uniform(shortest_m, sc.OPEN_LEG_M[1])
+                angle, leg_m = rng.uniform(-math.pi, math.pi), rng.uniform(*legs_m)
                 there = here + leg_m * np.array([math.cos(angle), math.sin(angle), 0.0])
                 if np.all(there[:2] >= low) and np.all(there[:2] <= high) and not self._blocked(here, there):
                     break
@@ -108,8 +113,9 @@ class RouteNetwork:
             here, walked = there, walked + leg_m
         return points
 
-    def _inside_obstacle(self, place: Array) -> bool:
-        return bool(contains(self._obstacles, place[None] + np.array([0.0, 0.0, _WAIST_M]))[0])
+    def _crowded(self, place: Array) -> bool:
+        aside = np.array([0.01, 0.0, 0.0])
+        return self._blocked(place - aside, place + aside)
 
     def _blocked(self, here: Array, there: Array) -> bool:
         """Whether the straight way, or a body's width beside it, meets an obstacle."""

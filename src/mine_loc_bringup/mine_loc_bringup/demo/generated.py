@@ -14,6 +14,7 @@ from mine_loc_sim.scene import SceneOptions, crew
 from mine_loc_sim.serial_lines import Ahead
 
 _TRUTH_RATE_HZ = 20
+_MARGIN_NS = NS_PER_S  # stamps of the first and last outputs may lie a little outside
 
 
 def load(folder: Path, people: int, seconds: float, seed: int) -> Recording:
@@ -26,7 +27,7 @@ def load(folder: Path, people: int, seconds: float, seed: int) -> Recording:
     scenario = Scenario(site, taking_part, SceneOptions(seed=seed, seconds=seconds))
     ahead = Ahead(byte_blocks(scenario), scenario.lines)
     lines = {line: ahead.arrivals(line) for line in scenario.lines}
-    stamps = np.arange(0, to_ns(seconds), NS_PER_S // _TRUTH_RATE_HZ)
+    stamps = np.arange(-_MARGIN_NS, to_ns(seconds) + _MARGIN_NS, NS_PER_S // _TRUTH_RATE_HZ)
     truths = [
         Truth(person.name, stamps / NS_PER_S, scenario.pose(person.name, stamps).position_m, shared_clock_and_frame=True)
         for person in taking_part
