@@ -6,8 +6,8 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from graph.domains import lent_domain  # noqa: E402
-from graph.observer import Observer  # noqa: E402
+from graph.domains import lent_domain
+from graph.observer import Observer
 
 
 @pytest.fixture

@@ -30,6 +30,12 @@ class Running:
     def alive(self) -> bool:
         return self.process.poll() is None
 
+    @property
+    def cpu_s(self) -> float:
+        """Seconds of processor time used so far."""
+        times = psutil.Process(self.process.pid).cpu_times()
+        return float(times.user + times.system)
+
     def ends(self, deadline_s: float = 20.0) -> int:
         """The exit status, waited for."""
         return self.process.wait(timeout=deadline_s)

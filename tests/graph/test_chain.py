@@ -1,5 +1,6 @@
 """Bytes on two serial lines become poses: every topic of the chain, its stamps, frames, covariances and verdicts."""
 
+import itertools
 import math
 import os
 from collections.abc import Iterator
@@ -10,6 +11,9 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph.live_graph import LiveGraph, live_graph
+from graph.observer import Heard
+from graph.walker import VISITOR_TAG, frame, position_m, ranging
 from mine_loc_interfaces.msg import (
     Epoch,
     FusionHealth,
@@ -26,9 +30,6 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
 from tf2_msgs.msg import TFMessage
 
-from graph.live_graph import LiveGraph, live_graph
-from graph.observer import Heard
-from graph.walker import VISITOR_TAG, frame, position_m, ranging
 from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.qos import STREAM
 from mine_loc_uwb.ranging import Range
@@ -138,7 +139,7 @@ def test_fused_stamps_of_a_person_never_go_back(heard):
 def test_epochs_that_are_not_late_are_in_order_and_use_each_round_once(heard):
     epochs = heard["epochs"].messages
     prompt = stamps_ns([epoch for epoch in epochs if not epoch.late])
-    assert all(later > earlier for earlier, later in zip(prompt, prompt[1:], strict=False))
+    assert all(later > earlier for earlier, later in itertools.pairwise(prompt))
     rounds = [item.seq for epoch in epochs for item in epoch.ranges]
     assert len(rounds) == len(set(rounds))
     assert [epoch.seq for epoch in epochs] == sorted(epoch.seq for epoch in epochs)

@@ -3,13 +3,12 @@
 from collections.abc import Iterator
 
 import pytest
-from lifecycle_msgs.msg import State, Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from mine_loc_interfaces.msg import UwbPose, UwbRange, UwbRangeArray
-
 from graph.observer import Observer
 from graph.processes import Running, node_command, running
 from graph.walker import ranging, write_site
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from mine_loc_interfaces.msg import UwbPose, UwbRange, UwbRangeArray
 
 pytestmark = pytest.mark.graph
 

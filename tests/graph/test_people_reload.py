@@ -1,15 +1,16 @@
 """people.yaml edited under `mine-loc up`: whoever is new is served at once, and nobody else notices."""
 
+import itertools
 import time
 from collections.abc import Iterator
 
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph.live_graph import NODES, LiveGraph, live_graph
+from graph.walker import VISITOR_TAG, WALKER_TAG, frame, imu_bytes, person, ranging, write_people
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from graph.live_graph import NODES, LiveGraph, live_graph
-from graph.walker import VISITOR_TAG, WALKER_TAG, frame, imu_bytes, person, ranging, write_people
 from mine_loc_bringup.demo.serial_player import PseudoSerial
 from mine_loc_core.nodes.qos import STREAM
 
@@ -65,7 +66,7 @@ def test_a_new_person_is_positioned_and_the_others_go_on_undisturbed(graph):
     observer.wait_for(served, what="samples, odometry and poses of the newcomer")
     assert {name: graph.up.node_process(name).pid for name in before} == before
     arrivals = [at_s for at_s in walkers.at_s if at_s > edited_s]
-    assert max(later - earlier for earlier, later in zip(arrivals, arrivals[1:], strict=False)) < 1.0
+    assert max(later - earlier for earlier, later in itertools.pairwise(arrivals)) < 1.0
 
     write_people(site, people)
     observer.wait_for(lambda: "[newcomer/n100_driver] stopped" in graph.up.output)

@@ -20,7 +20,6 @@ _MODULES = {  # import name → (name on PyPI, package of Debian and Ubuntu)
     "yaml": ("PyYAML", "python3-yaml"),
     "jsonschema": ("jsonschema", "python3-jsonschema"),
     "serial": ("pyserial", "python3-serial"),
-    "psutil": ("psutil", "python3-psutil"),
     "rich": ("rich", "python3-rich"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "rosbags": ("rosbags", ""),

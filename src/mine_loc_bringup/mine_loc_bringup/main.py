@@ -47,8 +47,8 @@ def build_parser(words: Sequence[str]) -> argparse.ArgumentParser:
 def main(words: Sequence[str] | None = None) -> int:
     """Run a command line; the exit status is 2 for what the user can mend, 130 after Ctrl-C."""
     words = sys.argv[1:] if words is None else words
-    arguments = build_parser(words).parse_args(words)
     try:
+        arguments = build_parser(words).parse_args(words)
         status: int = arguments.run(arguments)
     except MineLocError as error:
         print(error, file=sys.stderr)

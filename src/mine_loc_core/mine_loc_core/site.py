@@ -125,8 +125,8 @@ class UwbReceiver:
     port: str
     format: WireFormat
     baud: int
-    anchor_id: int | None
-    tag_id: int
+    anchor_id: int | None = None
+    tag_id: int = 0
 
 
 @dataclass(frozen=True, slots=True)

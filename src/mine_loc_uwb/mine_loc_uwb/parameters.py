@@ -17,7 +17,7 @@ class Dwm1000DriverParameters(NodeParameters):
     latency_ms: float = parameter(0.0, "constant delay from exchange to arrival", unit="ms", low=0.0, high=1000.0)
     trust_device_clock: bool = parameter(True, "stamp by the device's clock; false stamps on arrival")
     range_sd_m: float = parameter(0.1, "standard deviation given to ranges", unit="m", low=0.001, high=10.0)
-    silence_s: float = parameter(1.5, "no message for so long is an error", unit="s", low=0.1, high=60.0)
+    silence_s: float = parameter(0.8, "no message for so long is an error", unit="s", low=0.1, high=60.0)
 
 
 @dataclass(frozen=True)

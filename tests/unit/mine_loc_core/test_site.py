@@ -198,3 +198,10 @@ def test_the_documentation_names_every_key_of_the_schema(name):
 @pytest.mark.parametrize("name", ["site", "people"])
 def test_the_published_schemas_are_valid_schemas(name):
     jsonschema.Draft202012Validator.check_schema(read_schema(name))
+
+
+def test_a_line_whose_format_names_no_tag_may_be_given_one(tmp_path):
+    content = with_change(
+        ["uwb_receivers"], [{"name": "t", "port": "/dev/ttyACM0", "format": "dwm1001_shell", "tag": 7}]
+    )
+    assert load_site(written(tmp_path, content)).uwb_receivers[0].tag_id == 7

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -142,7 +143,7 @@ class NodeBase(LifecycleNode):
 
         return call
 
-    # Lifecycle: an exception in a transition would kill the process, so none leaves it (ros2/rclpy#1209).
+    # Lifecycle: rclpy swallows what a transition raises, so each says why it failed.
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lifecycle transition: `configure`."""
@@ -297,7 +298,10 @@ def run(node_class: Callable[[], NodeBase]) -> int:
         executor = SingleThreadedExecutor() if node.needs_guard_condition else EventsExecutor()
         executor.add_node(node)
         while not stopping.is_set():  # not spin(): the events executor's burns a core and never returns (rclpy 7.1.6)
-            executor.spin_once(timeout_sec=_SPIN_S)
+            try:
+                executor.spin_once(timeout_sec=_SPIN_S)
+            except RCLError as error:  # rclpy raises it for an impossible change_state request (ros2/rclpy#1209)
+                node.get_logger().error(str(error))
     except ConfigurationError as error:
         print(error, file=sys.stderr)
         return 2

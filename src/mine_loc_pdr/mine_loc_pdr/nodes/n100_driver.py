@@ -12,14 +12,14 @@ from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.serial_link import SerialLink
-from mine_loc_core.stamps import to_ns
+from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
 from mine_loc_pdr.nodes.messages import Covariances, to_header, to_imu, to_magnetic_field
 from mine_loc_pdr.parameters import N100DriverParameters
 
 _TICK_S = 1e-6
 _COUNTER_BITS = 64
-_SILENT_S = 1.0
+_SILENT_S = 0.8  # with diagnostics once a second, two seconds from the last byte to the error
 # A timer in the events executor costs a third of waking the other one for every few bytes; stamps are the device's.
 _DRAIN_PERIOD_S = 0.005
 
@@ -70,7 +70,9 @@ class N100Driver(NodeBase):
 
     def _new_clock(self) -> DeviceClock:
         p = self.parameters
-        return DeviceClock(_TICK_S, _COUNTER_BITS, latency_ns=to_ns(p.latency), bypass=p.stamp_on_arrival)
+        return DeviceClock(
+            _TICK_S, _COUNTER_BITS, latency_ns=round(p.latency_ms * NS_PER_MS), bypass=p.stamp_on_arrival
+        )
 
     def _drain(self) -> None:
         for chunk in self._link.take():
