@@ -131,20 +131,26 @@ def person_seconds_per_s() -> float:
     return walker.duration_s / (time.process_time() - begin)
 
 
-def main() -> int:
-    """Print the table and write it; exit status 0 whatever the figures say."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, help="write the figures here")
-    parser.add_argument("--calibration-half", action="store_true", help="compare with the odd subjects")
-    arguments = parser.parse_args()
+def run(*, calibration_half: bool = False) -> dict[str, dict[str, float | bool]]:
+    """Compute and print every figure's row."""
     folder = Path(os.environ["MINE_LOC_DATA"]) / "ipol_gait_lowerback" / "GaitData"
-    recorded = list(walks(folder, odd_subjects=arguments.calibration_half))
+    recorded = list(walks(folder, odd_subjects=calibration_half))
     real = people_figures(recorded)
     sim = people_figures(simulated(recorded, same_speed=False))
     same_speed = people_figures(simulated(recorded, same_speed=True))
     result = {name: compare(real[name], sim[name], same_speed[name]) for name in real}
     print(f"{len(real['steps'])} recorded people, {len(sim['steps'])} simulated")
     print_table(result)
+    return result
+
+
+def main() -> int:
+    """Print the table and write it; exit status 0 whatever the figures say."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--calibration-half", action="store_true", help="compare with the odd subjects")
+    arguments = parser.parse_args()
+    result = run(calibration_half=arguments.calibration_half)
     speed = person_seconds_per_s()
     print(f"{speed:.0f} person-seconds a second")
     if arguments.json:

@@ -145,7 +145,7 @@ class Synchroniser:
             self.used -= lost
             self.refused[Reason.OVERFLOW] += lost
 
-    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:
+    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:  # noqa: PLR0911 a ladder of refusals
         if item.stamp_ns > now_ns + self._future_ns:
             return Reason.FUTURE
         identity = (item.kind, item.source, item.seq, item.stamp_ns)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mine_loc_bringup.demo.site_folder import write_site_folder
+from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
 
@@ -11,7 +11,7 @@ SOURCE = Path(__file__).parents[3] / "config" / "isas_walk"
 
 def test_only_the_ports_differ_from_the_shipped_folder(tmp_path):
     before = (SOURCE / "site.yaml").read_text("utf-8")
-    ports = {"rtls": tmp_path / "rtls", "carrier/n100": tmp_path / "imu"}
+    ports = {"rtls": str(tmp_path / "rtls"), "carrier/n100": str(tmp_path / "imu")}
     target = tmp_path / "site"
     target.mkdir()
     (target / "left_over").touch()

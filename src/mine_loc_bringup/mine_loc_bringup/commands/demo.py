@@ -1,12 +1,13 @@
 """Play a recording as bytes into serial lines and run the whole live graph on it, with a report against truth.
 
 A public recording is used where MINE_LOC_DATA names the folder of recordings (RECORDING=m1l, a TREK1000 tag in a
-laboratory with Vicon truth, or isas_walk1, UWB and IMU on a stick with Vive truth); without it a recording is made on
-the spot. Results go to build/demo: report.json, track.png, and the bag of the run.
+laboratory with Vicon truth, or isas_walk1, UWB and IMU on a stick with Vive truth); without it, or with --site, people
+in a mine are simulated. Results go to build/demo: report.json, track.png, and the bag of the run.
 
 Examples:
   mine-loc demo
   mine-loc demo --recording isas_walk1 --seconds 30
+  mine-loc demo --site config/gallery_2km --people 5
 """
 
 import argparse
@@ -30,20 +31,21 @@ from mine_loc_bringup.console import Console
 from mine_loc_bringup.demo import generated, isas_walk, trek_lab
 from mine_loc_bringup.demo.recording import DATA_VARIABLE, Recording
 from mine_loc_bringup.demo.report import PersonReport, Track, person_report, plot, together
-from mine_loc_bringup.demo.serial_player import Player, PseudoSerial
-from mine_loc_bringup.demo.site_folder import write_site_folder
 from mine_loc_bringup.demo.table import people_table
 from mine_loc_bringup.graph import discovery_environment, expand
+from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import Site, load_site
+from mine_loc_sim.serial_lines import Player, PseudoSerial
 
 _RECORDINGS: dict[str, Callable[[], Recording]] = {
     "m1l": trek_lab.load,
     "isas_walk1": isas_walk.load,
-    "generated": generated.load,
 }
+_SIMULATED = "generated"
+_SIMULATED_SITE = "example_mine"
 _START_DEADLINE_S = 30.0
 _DRAW_PERIOD_S = 0.25
 _READY_PERIOD_S = 0.05
@@ -51,7 +53,10 @@ _READY_PERIOD_S = 0.05
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("--recording", choices=[*_RECORDINGS, ""], default="", help="what to play")
+    parser.add_argument("--recording", choices=[*_RECORDINGS, _SIMULATED, ""], default="", help="what to play")
+    parser.add_argument("--site", type=Path, metavar="FOLDER", help="simulate people at this site")
+    parser.add_argument("--people", type=int, default=3, metavar="N", help="so many of them (default 3)")
+    parser.add_argument("--seed", type=int, default=1, help="of the simulation (default 1)")
     parser.add_argument("--seconds", type=float, default=60.0, help="play at most so long (default 60)")
     parser.add_argument("--sites", type=Path, default=Path("config"), help="folder of the shipped sites")
     parser.add_argument("--out", type=Path, default=Path("build/demo"), help="folder of the results")
@@ -61,17 +66,25 @@ def run(arguments: argparse.Namespace) -> int:
     """Exit status 0 if every person was positioned, 1 if not, 2 for what the user can mend."""
     if not 2.0 <= arguments.seconds <= 3600.0:
         raise ConfigurationError(f"--seconds: {arguments.seconds:g}: allowed: 2 to 3600")
-    recording = _RECORDINGS[arguments.recording or _default_recording()]()
+    recording = _recording(arguments)
     os.environ.setdefault("ROS_DOMAIN_ID", "42")  # beside a mine's own graph, not in it
     demo = _Demo(recording, arguments)
     return asyncio.run(demo.run())
 
 
-def _default_recording() -> str:
-    if os.environ.get(DATA_VARIABLE):
-        return "m1l"
-    print(f"{DATA_VARIABLE} is not set: playing a recording made on the spot", file=sys.stderr)
-    return "generated"
+def _recording(arguments: argparse.Namespace) -> Recording:
+    name = arguments.recording
+    if arguments.site and name not in {"", _SIMULATED}:
+        raise ConfigurationError(
+            f"--site: {arguments.site} is simulated; allowed: not together with --recording {name}"
+        )
+    if not name and not arguments.site:
+        name = "m1l" if os.environ.get(DATA_VARIABLE) else _SIMULATED
+    if name in _RECORDINGS:
+        return _RECORDINGS[name]()
+    site = arguments.site or arguments.sites / _SIMULATED_SITE
+    print(f"simulating {arguments.people} people at {site}", file=sys.stderr)
+    return generated.load(site, arguments.people, arguments.seconds, arguments.seed)
 
 
 class _Demo:
@@ -83,8 +96,8 @@ class _Demo:
         self._out.mkdir(parents=True)
         self._lines = {name: PseudoSerial(self._out / "ports" / name.replace("/", "_")) for name in recording.lines}
         self._folder = self._out / "site"
-        ports = {name: line.port for name, line in self._lines.items()}
-        write_site_folder(arguments.sites / recording.site, self._folder, ports)
+        ports = {name: line.address for name, line in self._lines.items()}
+        write_site_folder(arguments.sites / recording.site, self._folder, ports, recording.people)
         self._log = (self._out / "nodes.log").open("w")
         self._console = Console(self._log)
         self._events: list[tuple[float, Event]] = []
@@ -96,7 +109,7 @@ class _Demo:
         commands = {node.name: node.command for node in expand(site, people, self._folder)}
         self._watch = DemoWatch([person.name for person in people], self._out / "bag")
         supervisor = Supervisor(discovery_environment(site.discovery), self._on_event, self._console.line)
-        self._players = [Player(self._lines[name], bursts) for name, bursts in self._recording.lines.items()]
+        self._players = [Player(self._lines[name], arrivals) for name, arrivals in self._recording.lines.items()]
         interrupted = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(number, interrupted.set)
@@ -136,8 +149,7 @@ class _Demo:
         self._started_s, self._started_ns = time.monotonic(), time.time_ns()
         for player in self._players:
             player.start(self._started_s)
-        lasts_s = max(bursts[-1][0] for bursts in self._recording.lines.values())
-        self._ends_s = min(self._seconds, lasts_s)
+        self._ends_s = min(self._seconds, self._recording.lasts_s)
         terminal = Terminal()
         with Live(self._table(), console=terminal, auto_refresh=False, transient=not terminal.is_terminal) as live:
             while (left_s := self._started_s + self._ends_s - time.monotonic()) > 0 and not interrupted.is_set():

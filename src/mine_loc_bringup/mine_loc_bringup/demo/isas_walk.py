@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from rosbags.highlevel import AnyReader
 
-from mine_loc_bringup.demo.recording import Burst, Recording, Truth, data_file
+from mine_loc_bringup.demo.recording import Recording, Truth, data_file
 from mine_loc_core.stamps import NS_PER_S, NS_PER_US
 from mine_loc_pdr.fdilink import ImuFrame, encode
+from mine_loc_sim.timed_bytes import Arrival
 from mine_loc_uwb.ranging import Range, RangingRound
 from mine_loc_uwb.wire.mine_loc_frame import encode_frame
 from mine_loc_uwb.wire.mine_loc_payload import FrameType, encode_ranges
@@ -39,12 +40,14 @@ def load() -> Recording:
     start_ns = min(rounds[0][0], imu[0][0])
     table = np.array(truth, dtype=np.float64)
     times_s = np.array([(row[0] - start_ns) / NS_PER_S for row in truth])
-    lines = {"rtls": _bursts(rounds, start_ns), "carrier/n100": _bursts(imu, start_ns)}
-    return Recording("isas_walk_uwb_imu ISAS-Walk1", "isas_walk", lines, [Truth("carrier", times_s, table[:, 1:])])
+    lines = {"rtls": _arrivals(rounds, start_ns), "carrier/n100": _arrivals(imu, start_ns)}
+    lasts_s = (max(rounds[-1][0], imu[-1][0]) - start_ns) / NS_PER_S
+    truths = [Truth("carrier", times_s, table[:, 1:])]
+    return Recording("isas_walk_uwb_imu ISAS-Walk1", "isas_walk", lines, lasts_s, truths)
 
 
-def _bursts(items: list[tuple[int, bytes]], start_ns: int) -> list[Burst]:
-    return [((stamp_ns - start_ns) / NS_PER_S, data) for stamp_ns, data in items]
+def _arrivals(items: list[tuple[int, bytes]], start_ns: int) -> list[Arrival]:
+    return [(stamp_ns - start_ns, data) for stamp_ns, data in items]
 
 
 def _round(number: int, message: Any) -> bytes:

@@ -1,7 +1,7 @@
 """What the demonstration plays: bytes for serial lines, and the truth to report against."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mine_loc_core.errors import ConfigurationError
+from mine_loc_core.people import Person
+from mine_loc_sim.timed_bytes import Arrival
 
 Array = npt.NDArray[np.float64]
 DATA_VARIABLE = "MINE_LOC_DATA"
@@ -25,27 +27,21 @@ class Truth:
     """Simulated truth needs no alignment; it is reported without."""
 
 
-Burst = tuple[float, bytes]
-"""Seconds since the recording began, and the bytes the device sends then."""
-
-
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording ready to be played.
+    """A recording ready to be played, once.
 
-    `site` names the folder under config/ that describes the place; `lines` maps `receiver` or `person/n100` to what
-    that serial line carries, in order of time.
+    `site` names the folder under config/ that describes the place, or is a path of its own; `lines` maps `receiver` or
+    `person/n100` to what arrives over that serial line, in order of time from 0 to `lasts_s`. `people` are those who
+    take part where not all of the site's do.
     """
 
     source: str
     site: str
-    lines: Mapping[str, Sequence[Burst]]
+    lines: Mapping[str, Iterable[Arrival]]
+    lasts_s: float
     truths: Sequence[Truth]
-
-    @property
-    def rounds(self) -> int:
-        """Number of bursts on the lines of the receivers."""
-        return sum(len(bursts) for name, bursts in self.lines.items() if "/" not in name)
+    people: Sequence[Person] | None = None
 
 
 def data_file(*parts: str) -> Path:

@@ -6,7 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.io
 
-from mine_loc_bringup.demo.recording import Array, Burst, Recording, Truth, data_file
+from mine_loc_bringup.demo.recording import Array, Recording, Truth, data_file
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_sim.timed_bytes import Arrival
 from mine_loc_uwb.ranging import Range, RangingRound
 from mine_loc_uwb.wire.trek1000 import encode_round
 
@@ -19,14 +21,15 @@ def load() -> Recording:
     """Ranges of a carried tag to four anchors at 10 Hz, Vicon truth on a clock and in a frame of its own."""
     rows = np.loadtxt(data_file("trek1000_bielefeld", "exp_data", "UWB_data_Ranges", "output_range_uwb_m1l.txt"))
     ms_of_day = _ms_of_day(rows[:, 0].astype(np.int64))
-    bursts = [
-        ((int(ms) - int(ms_of_day[0])) / 1e3, encode_round(_round(i, int(ms), row[2:6])))
+    arrivals: list[Arrival] = [
+        ((int(ms) - int(ms_of_day[0])) * NS_PER_MS, encode_round(_round(i, int(ms), row[2:6])))
         for i, (ms, row) in enumerate(zip(ms_of_day, rows, strict=True))
     ]
     vicon = scipy.io.loadmat(data_file("trek1000_bielefeld", "exp_data", "Vicon_mat", "m1L.mat"))["posedata_uwb"]
     times_s = (vicon[:, 1] - vicon[0, 1]) + vicon[:, 2] * 1e-9
-    lines: dict[str, list[Burst]] = {"trek": bursts}
-    return Recording("trek1000_bielefeld m1l", "trek_lab", lines, [Truth("walker", times_s, vicon[:, 3:6])])
+    truths = [Truth("walker", times_s, vicon[:, 3:6])]
+    lasts_s = arrivals[-1][0] / NS_PER_S
+    return Recording("trek1000_bielefeld m1l", "trek_lab", {"trek": arrivals}, lasts_s, truths)
 
 
 def _ms_of_day(hhmmssmmm: Integers) -> Integers:

@@ -5,17 +5,16 @@ import time
 from collections.abc import Iterable
 
 from sensor_msgs.msg import FluidPressure, Imu, MagneticField
-from std_msgs.msg import Header
 
 from mine_loc_core.device_clock import DeviceClock
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.serial_link import SerialLink
 from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
+from mine_loc_pdr.nodes.messages import Covariances, to_header, to_imu, to_magnetic_field
 from mine_loc_pdr.parameters import N100DriverParameters
 
 _TICK_S = 1e-6
@@ -23,7 +22,6 @@ _COUNTER_BITS = 64
 _SILENT_S = 0.8  # with diagnostics once a second, two seconds from the last byte to the error
 # A timer in the events executor costs a third of waking the other one for every few bytes; stamps are the device's.
 _DRAIN_PERIOD_S = 0.005
-_ABSENT = [-1.0] + 8 * [0.0]  # sensor_msgs/Imu: this quantity is not there
 
 
 class N100Driver(NodeBase):
@@ -39,7 +37,6 @@ class N100Driver(NodeBase):
         for name in ("person", "port"):
             if not getattr(self.parameters, name):
                 raise ConfigurationError(f"{self.get_name()}: {name}: empty; allowed: any but an empty text")
-        self._frame_id = f"{self.parameters.person}/imu_link"
         self._imu = self.publish_to(Imu, "imu/data", EVENTS)
         self._mag = self.publish_to(MagneticField, "imu/mag", EVENTS)
         self._pressure = self.publish_to(FluidPressure, "imu/pressure", EVENTS)
@@ -60,11 +57,7 @@ class N100Driver(NodeBase):
 
     def parameters_changed(self) -> None:
         """Work out the covariances."""
-        p = self.parameters
-        self._force_covariance = _isotropic(p.linear_acceleration_stddev)
-        self._rate_covariance = _isotropic(p.angular_velocity_stddev)
-        self._orientation_covariance = _isotropic(p.orientation_stddev)
-        self._field_covariance = _isotropic(p.magnetic_field_stddev)
+        self._covariances = Covariances.of(self.parameters)
 
     def clock_jumped(self, delta_ns: int) -> None:
         """Map device time anew."""
@@ -89,29 +82,13 @@ class N100Driver(NodeBase):
                 self._publish(measurement)
 
     def _publish(self, measurement: ImuMeasurement) -> None:
-        header = Header(stamp=to_time(measurement.stamp_ns), frame_id=self._frame_id)
-        imu = Imu(header=header)
-        imu.angular_velocity.x, imu.angular_velocity.y, imu.angular_velocity.z = measurement.rate_rad_s
-        imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z = measurement.force_m_s2
-        imu.angular_velocity_covariance = self._rate_covariance
-        imu.linear_acceleration_covariance = self._force_covariance
-        if measurement.orientation is None:
-            imu.orientation_covariance = _ABSENT
-        else:
-            q = imu.orientation
-            q.w, q.x, q.y, q.z = measurement.orientation
-            imu.orientation_covariance = self._orientation_covariance
-        self._imu.publish(imu)
+        header = to_header(measurement, self.parameters.person)
+        self._imu.publish(to_imu(measurement, header, self._covariances))
         if self._mag.get_subscription_count():  # publishing costs as much as all the rest, heard or not
-            self._publish_field(header, measurement)
+            self._mag.publish(to_magnetic_field(measurement, header, self._covariances))
         if measurement.pressure_pa is not None:
             self._pressure.publish(FluidPressure(header=header, fluid_pressure=measurement.pressure_pa))
         self._published += 1
-
-    def _publish_field(self, header: Header, measurement: ImuMeasurement) -> None:
-        mag = MagneticField(header=header, magnetic_field_covariance=self._field_covariance)
-        mag.magnetic_field.x, mag.magnetic_field.y, mag.magnetic_field.z = measurement.field_t
-        self._mag.publish(mag)
 
     def _line_health(self) -> Health:
         status = self._link.status
@@ -158,12 +135,6 @@ class N100Driver(NodeBase):
 
 def _no_wake() -> None:
     """The queue is looked into by a timer."""
-
-
-def _isotropic(stddev: float) -> list[float]:
-    """Row-major 3×3; all zero where the deviation is unknown (REP 145)."""
-    variance = stddev * stddev
-    return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 
 
 def main() -> int:

@@ -3,7 +3,6 @@
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArray
@@ -14,15 +13,13 @@ from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.serial_link import SerialLink
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_uwb.device_stamps import DeviceStamps
-from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array, to_tdoa_array
+from mine_loc_uwb.nodes.line_messages import LineIds, stamped_message
 from mine_loc_uwb.parameters import Dwm1000DriverParameters
-from mine_loc_uwb.ranging import CirWindow, Message, RangingRound, TdoaBlink
+from mine_loc_uwb.ranging import CirWindow, Message
 from mine_loc_uwb.wire.detect import AutoDetect, make_decoder
 from mine_loc_uwb.wire.starting import make_starter
-
-_FRAME = "uwb_tag_link"
 
 
 class Dwm1000Driver(NodeBase):
@@ -37,7 +34,7 @@ class Dwm1000Driver(NodeBase):
 
     def configure(self) -> None:
         """Create publishers; nothing is opened yet. A receiver that site.yaml does not know refuses the transition."""
-        self._tag_id, self._reporter_id = self._ids_of_line()
+        self._ids = self._ids_of_line()
         self._ranges = self.publish_to(UwbRangeArray, "uwb/ranges", EVENTS)
         self._tdoa = self.publish_to(TdoaArray, "uwb/tdoa", EVENTS)
         self._cir = self.publish_to(CirFrame, "uwb/cir", EVENTS)
@@ -111,41 +108,23 @@ class Dwm1000Driver(NodeBase):
         self._last_message = time.monotonic()
         if self._decoder.name != self._announced:
             self._announce()
-        if isinstance(message, RangingRound):
-            message = self._named(message)
-            key = (message.reporter_id, message.tag_id)
-            stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
-            seq = self._stamps.number(key, self._decoder, message.seq)
-            tick_ns = self._decoder.tick_period_s * NS_PER_S
-            self._ranges.publish(to_range_array(message, seq, stamp, _FRAME, tick_ns, self.parameters.range_sd_m))
-        elif isinstance(message, TdoaBlink):
-            key = (message.reference_anchor_id,)
-            stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
-            seq = self._stamps.number((*key, message.tag_id), self._decoder, message.seq)
-            self._tdoa.publish(to_tdoa_array(message, seq, stamp, _FRAME))
-        elif isinstance(message, CirWindow) and self._cir.get_subscription_count():
-            key = (message.anchor_id, message.tag_id)
-            stamp = self._stamps.stamp(key, self._decoder, message.device_ticks, arrival_ns)
-            self._cir.publish(to_cir_frame(message, stamp, _FRAME))
+        if isinstance(message, CirWindow) and not self._cir.get_subscription_count():
+            return
+        sd_m = self.parameters.range_sd_m
+        stamped = stamped_message(message, self._decoder, self._stamps, arrival_ns, self._ids, sd_m)
+        if stamped is not None:
+            {UwbRangeArray: self._ranges, TdoaArray: self._tdoa, CirFrame: self._cir}[type(stamped)].publish(stamped)
 
-    def _named(self, message: RangingRound) -> RangingRound:
-        """With the ids of the line where the wire format has none."""
-        if message.tag_id and message.reporter_id:
-            return message
-        return replace(
-            message, tag_id=message.tag_id or self._tag_id, reporter_id=message.reporter_id or self._reporter_id
-        )
-
-    def _ids_of_line(self) -> tuple[int, int]:
-        """(tag, reporter) that site.yaml gives to this line, 0 = none."""
+    def _ids_of_line(self) -> LineIds:
+        """What site.yaml says of this line."""
         p = self.parameters
         if not (p.site and p.receiver):
-            return 0, 0
+            return LineIds()
         receivers = {receiver.name: receiver for receiver in load_site(Path(p.site)).uwb_receivers}
         if p.receiver not in receivers:
             raise ConfigurationError(f"receiver: {p.receiver!r} is not in site.yaml; allowed: {', '.join(receivers)}")
         receiver = receivers[p.receiver]
-        return receiver.tag_id, receiver.anchor_id or 0
+        return LineIds(receiver.tag_id, receiver.anchor_id or 0)
 
     def _announce(self) -> None:
         self._announced = self._decoder.name

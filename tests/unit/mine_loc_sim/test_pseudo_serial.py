@@ -4,7 +4,8 @@ import os
 import threading
 import time
 
-from mine_loc_bringup.demo.serial_player import Player, PseudoSerial
+from mine_loc_core.stamps import NS_PER_S
+from mine_loc_sim.serial_lines import Player, PseudoSerial
 
 PATIENCE_S = 10.0
 
@@ -57,7 +58,7 @@ def test_what_nobody_reads_does_not_block_the_player(tmp_path):
 def test_bursts_are_played_in_order_not_before_their_time(tmp_path):
     line = PseudoSerial(tmp_path / "port")
     device = os.open(line.port, os.O_RDWR | os.O_NOCTTY)
-    player = Player(line, [(0.0, b"a"), (0.05, b"b"), (0.1, b"c")])
+    player = Player(line, [(0, b"a"), (50_000_000, b"b"), (100_000_000, b"c")])
     start_s = time.monotonic()
     player.start(start_s)
     assert read(device, 3) == b"abc"
@@ -68,7 +69,7 @@ def test_bursts_are_played_in_order_not_before_their_time(tmp_path):
 
 def test_a_stopped_player_falls_silent_and_ends(tmp_path):
     line, before = PseudoSerial(tmp_path / "port"), set(threading.enumerate())
-    player = Player(line, [(0.0, b"a"), (3600.0, b"b")])
+    player = Player(line, [(0, b"a"), (3600 * NS_PER_S, b"b")])
     player.start(time.monotonic())
     (thread,) = set(threading.enumerate()) - before
     player.stop()
