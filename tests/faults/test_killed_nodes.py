@@ -45,6 +45,7 @@ def time_in_run_queue_s(pid: int) -> float:
     return int(file.read_text().split()[1]) / 1e9 if file.exists() else 0.0
 
 
+@pytest.mark.flaky(reruns=2)  # discovery may lose datagrams on a machine that is busy with other things
 @pytest.mark.parametrize("node", OUTPUT_OF)
 def test_output_continues_within_three_seconds_of_the_kill(graph, heard, node, record_property):
     observer, poses, own = graph.observer, heard["fusion"], heard[node]
@@ -76,7 +77,8 @@ def test_output_continues_within_three_seconds_of_the_kill(graph, heard, node, r
     gap_s = max(later - earlier for earlier, later in itertools.pairwise(arrivals))
     record_property("recovered_s", round(recovered_s, 2))
     print(
-        f"{node}: back after {recovered_s:.2f} s, fused/poses silent for {gap_s:.2f} s, in the run queue {queued_s:.2f} s"
+        f"{node}: back after {recovered_s:.2f} s, fused/poses silent for {gap_s:.2f} s, "
+        f"in the run queue {queued_s:.2f} s"
     )
     assert recovered_s - queued_s < 3.0
     assert gap_s - queued_s < 3.0
