@@ -1,7 +1,7 @@
 """Faults on demand: what goes wrong on a line or with an anchor during a stretch of a scene.
 
-Written `KIND@START+DURATION[:DEVICE]` with seconds since the beginning. A device is a line (`portal`, `fitter/n100`) or,
-for anchors, an anchor's id; without one a fault befalls every line that it can.
+Written `KIND@START+DURATION[:DEVICE]` with seconds since the beginning. A device is a line (`portal`, `fitter/n100`)
+or, for anchors, an anchor's id; without one a fault befalls every line that it can.
 """
 
 import re

@@ -167,7 +167,9 @@ class RouteNetwork:
 
     def _free_place(self, room: ConvexPrisms, polygon_m: Array, middle: Array, door: Array) -> Array | None:
         """Return the place nearest the middle, on a grid, to which a straight way leads from the door."""
-        columns, rows = (np.linspace(low + 1.0, high - 1.0, 9) for low, high in zip(polygon_m.min(0), polygon_m.max(0), strict=True))
+        columns, rows = (
+            np.linspace(low + 1.0, high - 1.0, 9) for low, high in zip(polygon_m.min(0), polygon_m.max(0), strict=True)
+        )
         places = [np.array([x, y, middle[2]]) for x in columns for y in rows]
         for place in sorted(places, key=lambda p: float(np.linalg.norm(p - middle))):
             far_enough = np.linalg.norm(place - door) > _SHORTEST_LEG_M

@@ -99,9 +99,7 @@ class Scenario:
         self._reporters = Reporters(site, people, self._anchors_m, np.random.default_rng(seeds[2]), options)
         network = RouteNetwork(site, self._mine.obstacle_parts)
         rngs = [np.random.default_rng(seed) for seed in seeds[3:]]
-        self._bodies = {
-            person.name: self._body(person, network, rng) for person, rng in zip(people, rngs, strict=True)
-        }
+        self._bodies = {person.name: self._body(person, network, rng) for person, rng in zip(people, rngs, strict=True)}
 
     def _body(self, person: Person, network: RouteNetwork, rng: np.random.Generator) -> _Body:
         ways, walking, device, imu, tag = rng.spawn(5)
@@ -166,7 +164,7 @@ class Scenario:
     def _round_stamps(self, phase: float, start_ns: int, stop_ns: int) -> Stamps:
         period_ns = NS_PER_S / self.options.round_rate_hz
         first, last = (int(np.ceil(bound / period_ns - phase)) for bound in (start_ns, stop_ns))
-        return np.rint((np.arange(first, last) + phase) * period_ns).astype(np.int64)
+        return np.asarray(np.rint((np.arange(first, last) + phase) * period_ns), np.int64)
 
     def _plan(self, pose: TruePose, others_m: Array | None) -> RoundPlan:
         """Choose anchors every few rounds: of the nearest, those with the shortest ways."""
@@ -222,7 +220,9 @@ def _with_vehicles(site: Site) -> Mine:
 
 
 def _truth_of(person: Person, heard: HeardRound, site: Site) -> list[TrueLink]:
-    rows = zip(heard.which.tolist(), heard.link_class.tolist(), heard.distance_m.tolist(), heard.range_m.tolist(), strict=True)
+    rows = zip(
+        heard.which.tolist(), heard.link_class.tolist(), heard.distance_m.tolist(), heard.range_m.tolist(), strict=True
+    )
     return [
         TrueLink(heard.stamp_ns, person.name, site.anchors[number].id, link_class, distance_m, range_m - distance_m)
         for number, link_class, distance_m, range_m in rows

@@ -1,3 +1,4 @@
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ def network(site: Site) -> RouteNetwork:
 def along(points: np.ndarray) -> np.ndarray:
     """Places every half metre or so on the way."""
     shares = np.linspace(0.0, 1.0, 200)[:, None]
-    return np.concatenate([a + shares * (b - a) for a, b in zip(points, points[1:], strict=False)])
+    return np.concatenate([a + shares * (b - a) for a, b in itertools.pairwise(points)])
 
 
 @pytest.mark.parametrize("name", SITES)

@@ -75,7 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _recording(arguments: argparse.Namespace) -> Recording:
     name = arguments.recording
     if arguments.site and name not in {"", _SIMULATED}:
-        raise ConfigurationError(f"--site: {arguments.site} is simulated; allowed: not together with --recording {name}")
+        raise ConfigurationError(
+            f"--site: {arguments.site} is simulated; allowed: not together with --recording {name}"
+        )
     if not name and not arguments.site:
         name = "m1l" if os.environ.get(DATA_VARIABLE) else _SIMULATED
     if name in _RECORDINGS:

@@ -29,7 +29,9 @@ def load(folder: Path, people: int, seconds: float, seed: int) -> Recording:
     lines = {line: ahead.arrivals(line) for line in scenario.lines}
     stamps = np.arange(-_MARGIN_NS, to_ns(seconds) + _MARGIN_NS, NS_PER_S // _TRUTH_RATE_HZ)
     truths = [
-        Truth(person.name, stamps / NS_PER_S, scenario.pose(person.name, stamps).position_m, shared_clock_and_frame=True)
+        Truth(
+            person.name, stamps / NS_PER_S, scenario.pose(person.name, stamps).position_m, shared_clock_and_frame=True
+        )
         for person in taking_part
     ]
     return Recording(f"simulated {site.name}, seed {seed}", str(folder.resolve()), lines, seconds, truths, taking_part)
