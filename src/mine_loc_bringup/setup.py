@@ -4,7 +4,7 @@ setup(
     name="mine_loc_bringup",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"mine_loc_bringup": ["py.typed", "graph.yaml"]},
+    package_data={"mine_loc_bringup": ["py.typed", "graph.yaml", "fast_discovery.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/mine_loc_bringup"]),
         ("share/mine_loc_bringup", ["package.xml"]),

@@ -11,8 +11,8 @@ from graph.walker import VISITOR_TAG, WALKER_TAG, frame, imu_bytes, person, rang
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from mine_loc_bringup.demo.serial_player import PseudoSerial
 from mine_loc_core.nodes.qos import STREAM
+from mine_loc_sim.serial_lines import PseudoSerial
 
 pytestmark = pytest.mark.graph
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import yaml
 
-from mine_loc_bringup.demo.serial_player import PseudoSerial
 from mine_loc_pdr.fdilink import AhrsFrame, ImuFrame, encode
+from mine_loc_sim.serial_lines import PseudoSerial
 from mine_loc_uwb.ranging import Range, RangingRound
 from mine_loc_uwb.wire.mine_loc_frame import encode_frame
 from mine_loc_uwb.wire.mine_loc_payload import FrameType, encode_ranges

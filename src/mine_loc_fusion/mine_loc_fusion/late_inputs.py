@@ -15,15 +15,10 @@ class LateInputCorrector:
         self._history_ns = history_ns
         self._history: deque[tuple[EpochInputs, Any]] = deque()  # (inputs, state before them), in order of stamp
 
-    @property
-    def newest_ns(self) -> int | None:
-        """Stamp of the newest epoch used."""
-        return self._history[-1][0].stamp_ns if self._history else None
-
     def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
         """Use an epoch; an old one by rewinding. Beyond the history its measurements are refused as stale."""
         replay: list[EpochInputs] = []
-        if self._history and inputs.stamp_ns < self._history[0][0].stamp_ns:
+        if self._history and inputs.stamp_ns < self._history[-1][0].stamp_ns - self._history_ns:
             return _stale(inputs)
         while self._history and self._history[-1][0].stamp_ns > inputs.stamp_ns:
             later, state = self._history.pop()

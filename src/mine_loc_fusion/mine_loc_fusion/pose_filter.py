@@ -27,6 +27,8 @@ _SHARED_BIAS_SD_M = (
 )
 _YAW_BASELINE_M = 3.0
 _MAX_PREDICTION_S = 600.0
+_FARTHEST_M = 1e8  # beyond any map, grid coordinates included
+_LONGEST_STEP_M = 5.0
 
 
 class PoseFilter:
@@ -98,7 +100,9 @@ class PoseFilter:
 
     def _use_position(self, fix: PositionFix, stamp_ns: int) -> Verdict:
         R = fix.covariance_m2 + np.eye(2) * _MIN_POSITION_SD_M**2
-        if not (np.isfinite(fix.position_m).all() and np.isfinite(R).all() and np.all(np.linalg.eigvalsh(R) > 0)):
+        R = (R + R.T) / 2.0
+        finite = np.abs(fix.position_m).max() < _FARTHEST_M and np.abs(R).max() < _FARTHEST_M**2  # false for NaN
+        if not finite or np.linalg.eigvalsh(R)[0] <= 0.0:
             return Verdict(Source.UWB_POSE, 0, Reason.INVALID)
         if self._stamp_ns is None:
             self._begin(fix.position_m, R, stamp_ns)
@@ -132,7 +136,10 @@ class PoseFilter:
         self._pairs.clear()
 
     def _use_step(self, step: StepFix, stamp_ns: int) -> Verdict:
-        if not all(map(math.isfinite, (step.length_m, step.heading_rad))) or step.length_m < 0.0:
+        variances = (step.length_variance_m2, step.heading_variance_rad2)
+        if not (0.0 <= step.length_m < _LONGEST_STEP_M and math.isfinite(step.heading_rad)) or not all(
+            0.0 <= variance < math.inf for variance in variances
+        ):
             return Verdict(Source.STEP, 0, Reason.INVALID)
         self._odom = self._odom + step.length_m * np.array([math.cos(step.heading_rad), math.sin(step.heading_rad)])
         self._step_ns = stamp_ns

@@ -14,7 +14,8 @@ from typing import Any
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason
 
-_REMEMBERED_INPUTS = 512
+_REMEMBERED_INPUTS = 4096  # four seconds of 64 links at 15 Hz
+_REMEMBERED_SOURCES = 256
 _LINK_STATES_EXPECTED_NS = 2 * NS_PER_S
 
 
@@ -28,6 +29,16 @@ class Kind(Enum):
     STEP = "steps"
     LANDMARK = "landmark_fixes"
 
+
+CAPACITY = {
+    Kind.RANGES: 8,
+    Kind.TDOA: 8,
+    Kind.UWB_POSE: 8,
+    Kind.LINK_STATE: 64,
+    Kind.STEP: 16,
+    Kind.LANDMARK: 4,
+}
+"""Bounds of the sequences in mine_loc_interfaces/Epoch."""
 
 _COMPANIONS = (Kind.UWB_POSE, Kind.LINK_STATE)
 
@@ -69,8 +80,10 @@ class _Person:
     open: dict[int, _Open] = field(default_factory=dict)
     last_stamp_ns: int | None = None
     seq: int = 0
-    seen: OrderedDict[Hashable, None] = field(default_factory=OrderedDict)
-    newest_of_source: dict[Hashable, int] = field(default_factory=dict)
+    seen: OrderedDict[tuple[Kind, Hashable, int, int], None] = field(default_factory=OrderedDict)
+    forgotten_ns: int | None = None
+    """Newest stamp among the inputs no longer remembered: whether an older one is a duplicate cannot be told."""
+    newest_of_source: OrderedDict[Hashable, int] = field(default_factory=OrderedDict)
     link_state_heard_ns: int | None = None
 
 
@@ -117,31 +130,49 @@ class Synchroniser:
     def reset(self) -> None:
         """Time jumped: forget all stamps. What was open is lost and counted as overflow."""
         for person in self._people.values():
-            self.refused[Reason.OVERFLOW] += sum(
-                len(v) for epoch in person.open.values() for v in epoch.inputs.values()
-            )
+            self._count_lost(person)
         self._people = {name: _Person(seq=person.seq) for name, person in self._people.items()}
 
     def forget(self, person: str) -> None:
         """Release a person who is no longer in the people file."""
-        self._people.pop(person, None)
+        gone = self._people.pop(person, None)
+        if gone is not None:
+            self._count_lost(gone)
 
-    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:
+    def _count_lost(self, person: _Person) -> None:
+        lost = sum(len(payloads) for epoch in person.open.values() for payloads in epoch.inputs.values())
+        if lost:
+            self.used -= lost
+            self.refused[Reason.OVERFLOW] += lost
+
+    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:  # noqa: PLR0911 a ladder of refusals
         if item.stamp_ns > now_ns + self._future_ns:
             return Reason.FUTURE
         identity = (item.kind, item.source, item.seq, item.stamp_ns)
         if identity in person.seen:
             return Reason.DUPLICATE
         newest_ns = person.newest_of_source.get((item.kind, item.source))
-        if newest_ns is not None and item.stamp_ns < newest_ns and item.kind is not Kind.LINK_STATE:
+        if newest_ns is not None and item.stamp_ns < newest_ns:
             return Reason.BACKWARD
+        if person.forgotten_ns is not None and item.stamp_ns <= person.forgotten_ns:
+            return Reason.STALE
         if person.last_stamp_ns is not None and item.stamp_ns < person.last_stamp_ns - self._history_ns:
             return Reason.STALE
+        epoch = person.open.get(item.stamp_ns)
+        if epoch is not None and len(epoch.inputs.get(item.kind, ())) >= CAPACITY[item.kind]:
+            return Reason.OVERFLOW
+        self._remember(person, item, identity)
+        return Reason.ACCEPTED
+
+    def _remember(self, person: _Person, item: SyncInput, identity: tuple[Kind, Hashable, int, int]) -> None:
         person.seen[identity] = None
         if len(person.seen) > _REMEMBERED_INPUTS:
-            person.seen.popitem(last=False)
-        person.newest_of_source[item.kind, item.source] = item.stamp_ns
-        return Reason.ACCEPTED
+            (*_, stamp_ns), _ = person.seen.popitem(last=False)
+            person.forgotten_ns = max(stamp_ns, person.forgotten_ns or stamp_ns)
+        if item.kind is not Kind.LINK_STATE:  # links of one round are judged in any order
+            person.newest_of_source[item.kind, item.source] = item.stamp_ns
+            if len(person.newest_of_source) > _REMEMBERED_SOURCES:
+                person.newest_of_source.popitem(last=False)
 
     def _emit(self, name: str, person: _Person, now_ns: int) -> list[Epoch]:
         """In order of stamp, up to the newest that is due: one that still waits goes out with a later one."""

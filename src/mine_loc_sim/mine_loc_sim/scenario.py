@@ -164,7 +164,8 @@ class Scenario:
     def _round_stamps(self, phase: float, start_ns: int, stop_ns: int) -> Stamps:
         period_ns = NS_PER_S / self.options.round_rate_hz
         first, last = (int(np.ceil(bound / period_ns - phase)) for bound in (start_ns, stop_ns))
-        return np.asarray(np.rint((np.arange(first, last) + phase) * period_ns), np.int64)
+        stamps: Stamps = np.rint((np.arange(first, last) + phase) * period_ns).astype(np.int64)
+        return stamps
 
     def _plan(self, pose: TruePose, others_m: Array | None) -> RoundPlan:
         """Choose anchors every few rounds: of the nearest, those with the shortest ways."""

@@ -121,5 +121,5 @@ def check_formats(site: Site) -> None:
 
 
 def wire_format(receiver: UwbReceiver) -> str:
-    """Return what the emulator of this receiver speaks: its format, mine_loc where the driver is to detect it."""
+    """Return the format that the emulator of this receiver speaks: its own, mine_loc where the driver detects it."""
     return "mine_loc" if receiver.format == "auto" else receiver.format

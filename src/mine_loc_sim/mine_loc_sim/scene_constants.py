@@ -14,8 +14,7 @@ CANDIDATES = 8
 DISCOVERY_ROUNDS = 10
 """A tag looks for anchors anew after so many rounds: assumed."""
 REACH_M = 120.0
-"""Longest way over which an anchor answers: assumed; vendors plan 20 to 50 m between anchors, 100 m in clear
-tunnels."""
+"""Longest way over which an anchor answers: assumed; vendors plan 20 to 50 m between anchors, 100 m in tunnels."""
 LOST_ROUND_SHARE = 0.01
 """Rounds that collide or go unheard on their way to the receiver: assumed."""
 CARRIER_OFFSET_SD_PPM = 0.1

@@ -59,9 +59,9 @@ class PseudoSerial:
     def unplug(self) -> None:
         """Close the pseudo-terminal and take the link away, as a pulled cable does."""
         self.port.unlink(missing_ok=True)
-        os.close(self._slave)
-        os.close(self._master)
-        self._master = self._slave = -1
+        ends, self._master, self._slave = (self._slave, self._master), -1, -1  # a player may be writing
+        for end in ends:
+            os.close(end)
 
     def write(self, data: bytes) -> None:
         """Send bytes; what nobody reads is lost, as on a real line."""

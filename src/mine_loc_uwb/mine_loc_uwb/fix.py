@@ -23,8 +23,8 @@ class FixStatus(IntEnum):
 class Fix:
     """A position from one ranging round, in the frame of the anchors.
 
-    `position_m` has shape (3,) and is NaN unless `status` is OK; `covariance_m2` has shape (3, 3); `gdop` is the
-    standard deviation of the position over that of a range in the solved dimensions, infinite when degenerate.
+    `position_m` has shape (3,) and is NaN unless `status` is OK; `covariance_m2` has shape (3, 3); `gdop` is what
+    the geometry makes of a range's standard deviation at best, in the solved dimensions, infinite when degenerate.
     """
 
     status: FixStatus

@@ -6,9 +6,11 @@ The circle of the last anchor is subtracted from the others, which leaves equati
 
 import numpy as np
 
+from mine_loc_core.gates import chi2_quantile
 from mine_loc_uwb.fix import Array, Fix, FixStatus, no_fix
 
 _RANK_TOLERANCE = 1e-6
+_CONTRADICTION = 0.999  # residuals beyond this quantile say that the ranges are worse than they claim
 
 
 def solve(
@@ -34,30 +36,43 @@ def solve(
     if np.linalg.matrix_rank(A, tol=_RANK_TOLERANCE * max(1.0, float(np.abs(A).max()))) < dimensions:
         return no_fix(FixStatus.DEGENERATE, dimensions, n)
     r2 = squares - np.sum(nodes**2, axis=1)
-    solution = np.linalg.lstsq(A, r2[-1] - r2[:-1], rcond=None)[0]
+    inverse = np.linalg.pinv(A)
+    b = r2[-1] - r2[:-1]
+    solution = inverse @ b
+    # How errors of the slant ranges enter the differences: d(r_n² − r_i²) = 2 (d_n δ_n − d_i δ_i).
+    G = np.column_stack([-2.0 * np.diag(ranges_m[:-1]), np.full(n - 1, 2.0 * ranges_m[-1])])
+    gain = inverse @ G
+    variance = _range_variance(b - A @ solution, G - A @ gain, n - 1 - dimensions, range_sd_m)
 
     position = np.append(solution, 0.0)[:3] + centre
     if height_m is not None:
         position[2] = height_m
-    return _judge(anchors_m, ranges_m, position, range_sd_m, dimensions, max_gdop)
+    return _judge(anchors_m, ranges_m, position, gain @ gain.T * variance, max_gdop)
 
 
-def _judge(
-    anchors_m: Array, ranges_m: Array, position: Array, range_sd_m: float, dimensions: int, max_gdop: float
-) -> Fix:
-    """Covariance from the geometry at the solution; GDOP beyond the limit is degenerate."""
+def _range_variance(residuals: Array, residual_gain: Array, redundancy: int, range_sd_m: float) -> float:
+    """The variance given for the ranges, or that of the residuals [m²] where they contradict it."""
+    if redundancy < 1:
+        return range_sd_m**2
+    observed = float(np.sum(residuals**2) / np.sum(residual_gain**2))
+    believable = range_sd_m**2 * chi2_quantile(_CONTRADICTION, redundancy) / redundancy
+    return observed if observed > believable else range_sd_m**2
+
+
+def _judge(anchors_m: Array, ranges_m: Array, position: Array, solved_covariance: Array, max_gdop: float) -> Fix:
+    """Geometry and residuals at the solution: a GDOP beyond the limit is degenerate."""
+    dimensions = len(solved_covariance)
     offsets = position - anchors_m
     distances = np.maximum(np.linalg.norm(offsets, axis=1), 1e-9)
     J = (offsets / distances[:, None])[:, :dimensions]
     information = J.T @ J
     if np.linalg.cond(information) > 1.0 / np.finfo(float).eps:
         return no_fix(FixStatus.DEGENERATE, dimensions, len(ranges_m))
-    unit_covariance = np.linalg.inv(information)
-    gdop = float(np.sqrt(np.trace(unit_covariance)))
+    gdop = float(np.sqrt(np.trace(np.linalg.inv(information))))
     if gdop > max_gdop:
         return no_fix(FixStatus.DEGENERATE, dimensions, len(ranges_m), gdop)
     residuals = ranges_m - distances
     rms = float(np.sqrt(np.mean(residuals**2)))
     covariance = np.zeros((3, 3))
-    covariance[:dimensions, :dimensions] = unit_covariance * max(range_sd_m, rms) ** 2
+    covariance[:dimensions, :dimensions] = solved_covariance
     return Fix(FixStatus.OK, position, covariance, dimensions, len(ranges_m), rms, gdop)

@@ -9,7 +9,7 @@ import numpy as np
 from mine_loc_core.site import Anchor
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_uwb import least_squares
-from mine_loc_uwb.fix import Fix
+from mine_loc_uwb.fix import Fix, FixStatus
 from mine_loc_uwb.parameters import UwbSolverParameters
 
 _FROZEN_ROUNDS = 20
@@ -38,15 +38,15 @@ class RoundSolver:
         self, tag_id: int, ranges: Sequence[MeasuredRange], height_m: float | None
     ) -> tuple[Fix, tuple[Verdict, ...]]:
         """Position of one tag (see `least_squares.solve`) and one verdict a range, in their order."""
-        reasons = [self._check(tag_id, item) for item in ranges]
+        reasons: list[Reason] = []
         seen: set[int] = set()
-        for i, item in enumerate(ranges):
-            if reasons[i] is Reason.ACCEPTED and item.anchor_id in seen:
-                reasons[i] = Reason.DUPLICATE
-            seen.add(item.anchor_id)
+        for item in ranges:
+            reasons.append(Reason.DUPLICATE if item.anchor_id in seen else self._check(tag_id, item))
+            if reasons[-1] is Reason.ACCEPTED:
+                seen.add(item.anchor_id)
         used = [item for item, reason in zip(ranges, reasons, strict=True) if reason is Reason.ACCEPTED]
         anchors = [self.anchors[item.anchor_id] for item in used]
-        variances = [item.variance_m2 for item in used if item.variance_m2 > 0]
+        variances = [item.variance_m2 for item in used if 0.0 < item.variance_m2 < math.inf]
         fix = least_squares.solve(
             np.array([anchor.position_m for anchor in anchors]).reshape(-1, 3),
             np.array([item.range_m - anchor.range_offset_m for item, anchor in zip(used, anchors, strict=True)]),
@@ -54,6 +54,8 @@ class RoundSolver:
             height_m=height_m,
             max_gdop=self.parameters.max_gdop,
         )
+        if fix.status is not FixStatus.OK:
+            reasons = [Reason.DEGENERATE if reason is Reason.ACCEPTED else reason for reason in reasons]
         verdicts = tuple(
             Verdict(Source.RANGE, item.anchor_id, reason, innovation=self._residual(item, fix))
             for item, reason in zip(ranges, reasons, strict=True)

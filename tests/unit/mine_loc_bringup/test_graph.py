@@ -110,8 +110,17 @@ def test_every_package_of_the_graph_is_one_of_ours():
     ],
 )
 def test_discovery_is_what_the_site_says(discovery, range_, peers):
-    expected = {"ROS_AUTOMATIC_DISCOVERY_RANGE": range_, "ROS_STATIC_PEERS": peers}
-    assert discovery_environment(discovery) == expected
+    environment = discovery_environment(discovery)
+    assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == range_
+    assert environment["ROS_STATIC_PEERS"] == peers
+
+
+def test_discovery_is_quick_unless_the_user_has_a_profile(monkeypatch):
+    variable = "FASTRTPS_DEFAULT_PROFILES_FILE"
+    monkeypatch.delenv(variable, raising=False)
+    assert Path(discovery_environment(Discovery())[variable]).is_file()
+    monkeypatch.setenv(variable, "/etc/own.xml")
+    assert discovery_environment(Discovery())[variable] == "/etc/own.xml"
 
 
 @pytest.mark.parametrize("spec", read_graph(), ids=lambda spec: spec.key)

@@ -39,7 +39,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class PersonReport:
-    """One person's figures, with the track and the aligned truth for the plot."""
+    """One person's figures, with the track and the aligned truth (n, 2), NaN where there is none, for the plot."""
 
     name: str
     figures: Mapping[str, object]
@@ -48,7 +48,7 @@ class PersonReport:
 
 
 def person_report(name: str, track: Track, truth: Truth, end_s: float) -> PersonReport:
-    """Score a track; raises ValueError when nothing was published."""
+    """Score a track; raises ValueError when nothing was published or truth covers too little of it."""
     if not len(track.times_s):
         raise ValueError(f"{name}: no output was received")
     alignment = _alignment(track, truth)
@@ -56,7 +56,8 @@ def person_report(name: str, track: Track, truth: Truth, end_s: float) -> Person
         truth_at(track.times_s + alignment.time_offset_s, truth.times_s, truth.positions_m[:, :2])
     )
     distances = np.linalg.norm(track.positions_m - truth_m, axis=1)
-    errors = horizontal_error(distances)
+    known = np.isfinite(distances)  # there is truth at that instant
+    errors = horizontal_error(distances[known])
     latencies_ms = (track.received_s - track.times_s)[track.measured] * 1e3
     gaps = [(a, b) for a, b in zip(track.received_s, track.received_s[1:], strict=False) if b - a > _GAP_S]
     figures = {
@@ -69,7 +70,7 @@ def person_report(name: str, track: Track, truth: Truth, end_s: float) -> Person
         "third_quartile_m": errors.third_quartile_m,
         "ce95_m": errors.ce95_m,
         "max_m": errors.max_m,
-        "claimed_ce95_holds": float(np.mean(distances <= track.ce95_m)),
+        "claimed_ce95_holds": float(np.mean(distances[known] <= track.ce95_m[known])),
         "latency_p50_ms": float(np.percentile(latencies_ms, 50)) if len(latencies_ms) else None,
         "latency_p99_ms": float(np.percentile(latencies_ms, 99)) if len(latencies_ms) else None,
         "gaps_over_half_a_second": [{"at_s": round(float(a), 2), "length_s": round(float(b - a), 2)} for a, b in gaps],
@@ -87,7 +88,7 @@ def together(reports: Sequence[PersonReport]) -> dict[str, object]:
     """All people as one: pooled errors and latencies, mean availability."""
     distances = np.concatenate([np.linalg.norm(r.track.positions_m - r.truth_m, axis=1) for r in reports])
     latencies_ms = 1e3 * np.concatenate([(r.track.received_s - r.track.times_s)[r.track.measured] for r in reports])
-    errors = asdict(horizontal_error(distances))
+    errors = asdict(horizontal_error(distances[np.isfinite(distances)]))
     errors["horizontal_mean_m"] = errors.pop("mean_m")
     return {
         "availability": float(np.mean([float(str(r.figures["availability"])) for r in reports])),
