@@ -1,5 +1,6 @@
 """One N100 on a walker, as frames: 0x40 and 0x41 in turn, by the device's own clock."""
 
+import itertools
 import math
 
 import numpy as np
@@ -38,16 +39,18 @@ class N100Device:
     def frames(self, stop_ns: int) -> list[Timed]:
         """Return the next frames with the instants of their measurements, until before `stop_ns`."""
         count = max(0, math.ceil(stop_ns / self._period_ns - self._phase) - self._sent)
+        if not count:
+            return []
         number = self._sent + np.arange(count)
         self._sent += count
         stamps = np.rint((number + self._phase) * self._period_ns).astype(np.int64)
         motion = self._walker.motion(stamps)
         device_us = self._first_us + number * sc.N100_PERIOD_US
-        frames: list[Timed] = []
         sensors = number % 2 == 0
-        frames += self._sensor_frames(_pick(motion, sensors), device_us[sensors])
-        frames += self._attitude_frames(_pick(motion, ~sensors), device_us[~sensors])
-        return sorted(frames, key=lambda item: item[0])
+        turns: list[list[Timed]] = [[], []]
+        turns[int(number[0] % 2)] = self._sensor_frames(_pick(motion, sensors), device_us[sensors])
+        turns[1 - int(number[0] % 2)] = self._attitude_frames(_pick(motion, ~sensors), device_us[~sensors])
+        return [frame for pair in itertools.zip_longest(*turns) for frame in pair if frame is not None]
 
     def _sensor_frames(self, motion: WaistMotion, device_us: NDArray[np.int64]) -> list[Timed]:
         samples = self._imu.sample(motion, self._field.at(motion.position_m))

@@ -1,5 +1,6 @@
 """From rounds as measured to what devices report of them: ids, counters, device clocks, losses, and on which line."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
@@ -73,7 +74,6 @@ class Reporters:
         options: SceneOptions,
     ) -> None:
         self._ids = [anchor.id for anchor in site.anchors]
-        self._anchors_m = anchors_m
         self._options = options
         self._rng, sync, *clocks = rng.spawn(2 + len(self._ids) + len(people))
         self._sync, self._sync_ns = AnchorSync(max(len(self._ids), 1), sync), 0
@@ -81,6 +81,8 @@ class Reporters:
         tagged = [person.tag_id for person in people if person.tag_id]
         self._tag_clocks = {tag: UwbClock(each) for tag, each in zip(tagged, clocks[len(self._ids) :], strict=False)}
         self._rounds = {tag: int(self._rng.integers(2**16)) for tag in tagged}
+        places_m = dict(zip(self._ids, anchors_m.tolist(), strict=True))
+        self._places_m = {r.name: places_m[r.anchor_id] for r in site.uwb_receivers if r.anchor_id is not None}
         self._lines = {tag: reporting_lines(site, tag) for tag in tagged}
 
     def report(self, person: Person, heard: HeardRound) -> Iterator[tuple[str, Report]]:
@@ -88,8 +90,7 @@ class Reporters:
         tag_id = person.tag_id
         self._rounds[tag_id] = (self._rounds[tag_id] + 1) % 2**32
         time_us = self._tag_clocks[tag_id].at_us(heard.stamp_ns)
-        rates = [self._anchor_clocks[number].rate_ppm for number in heard.which]
-        sync_m = self._sync_at(heard.stamp_ns)
+        rates = [self._anchor_clocks[number].rate_ppm for number in heard.which.tolist()]
         lost = self._rng.random() < sc.LOST_ROUND_SHARE
         line = self._line(tag_id, heard)
         if lost or line is None or not len(heard.which):
@@ -100,7 +101,7 @@ class Reporters:
         if wire_format(line) != "mine_loc":
             return
         if self._options.tdoa and len(heard.which) > 1 and np.isfinite(heard.range_m[0]):
-            yield line.name, self._blink(tag_id, heard, sync_m)
+            yield line.name, self._blink(tag_id, heard)
         if heard.accumulators is not None:
             yield from ((line.name, window) for window in _windows(ranging, heard))
 
@@ -110,33 +111,26 @@ class Reporters:
         anchors = [line for line in lines if line.anchor_id is not None]
         if not anchors:
             return lines[0] if lines else None
-        places = self._anchors_m[[self._ids.index(line.anchor_id or 0) for line in anchors]]
-        return anchors[int(np.linalg.norm(places - heard.tag_m, axis=1).argmin())]
+        if len(anchors) == 1:
+            return anchors[0]
+        return min(anchors, key=lambda line: math.dist(self._places_m[line.name], heard.tag_m))
 
     def _ranging(
         self, tag_id: int, reporter_id: int, time_us: int, heard: HeardRound, rates_ppm: Sequence[float]
     ) -> RangingRound:
         own_ppm = self._tag_clocks[tag_id].rate_ppm
         errors_ppm = sc.CARRIER_OFFSET_SD_PPM * self._rng.standard_normal(len(rates_ppm))
+        columns = (heard.which.tolist(), heard.range_m.tolist(), heard.receptions, rates_ppm, errors_ppm.tolist())
         ranges = []
-        for number, reception in enumerate(heard.receptions):
-            measured = bool(np.isfinite(heard.range_m[number]))
-            first_path_dbm, receive_dbm = powers_dbm(reception)
-            ranges.append(
-                Range(
-                    self._ids[heard.which[number]],
-                    float(heard.range_m[number]),
-                    first_path_dbm,
-                    receive_dbm,
-                    reception.first_path_index,
-                    rates_ppm[number] - own_ppm + float(errors_ppm[number]) if measured else nan,
-                )
-            )
+        for anchor, range_m, reception, rate_ppm, error_ppm in zip(*columns, strict=True):
+            offset_ppm = nan if math.isnan(range_m) else rate_ppm - own_ppm + error_ppm
+            powers = powers_dbm(reception)
+            ranges.append(Range(self._ids[anchor], range_m, *powers, reception.first_path_index, offset_ppm))
         return RangingRound(tag_id, reporter_id, self._rounds[tag_id], time_us, tuple(ranges), corrected=False)
 
-    def _blink(self, tag_id: int, heard: HeardRound, sync_m: NDArray[np.float64]) -> TdoaBlink:
+    def _blink(self, tag_id: int, heard: HeardRound) -> TdoaBlink:
         """Differences to the first anchor, by whose clock the blink is stamped."""
-        differences = range_differences(heard.range_m, sync_m[heard.which], 0)
+        differences = range_differences(heard.range_m, self._sync_at(heard.stamp_ns)[heard.which], 0)
         powers = [powers_dbm(reception) for reception in heard.receptions]
         reference = int(heard.which[0])
         others = tuple(

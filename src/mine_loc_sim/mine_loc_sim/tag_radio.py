@@ -1,6 +1,5 @@
 """The ranging rounds of one tag: which anchors it ranges, and what the chip reports of each exchange."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.range_law import FastTagLinks
 from mine_loc_sim.ranging_link import Exchanges, Radios, Ranges, TagLinks
 from mine_loc_sim.wearer import Wearer
-from mine_loc_uwb.received_power import Reception, Sfd, reception_with_powers
+from mine_loc_uwb.received_power import Reception, Sfd
 
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -90,25 +89,33 @@ def _heard(plan: RoundPlan, number: int, ranges: Ranges) -> HeardRound:
         ranges.range_m[links],
         ranges.level_bias_m[links],
         ranges.link_class[links],
-        _receptions(ranges, links.tolist()),
+        _receptions(ranges, links),
         samples,
     )
 
 
-def _receptions(ranges: Ranges, links: Sequence[int]) -> tuple[Reception, ...]:
+def _receptions(ranges: Ranges, links: Indices) -> tuple[Reception, ...]:
     """Registers of each link; none of a reception that failed."""
     if ranges.exchanges is not None:
-        return tuple(_registers(ranges.exchanges, link) for link in links)
+        return tuple(_registers(ranges.exchanges, link) for link in links.tolist())
+    symbols = constants.PREAMBLE_COUNT_1024
+    amplitude = symbols * 10.0 ** (0.05 * (ranges.first_path_power_dbm[links] + constants.POWER_CONSTANT_DB)) / 3**0.5
+    energy = symbols**2 * 10.0 ** (0.1 * (ranges.receive_power_dbm[links] + constants.POWER_CONSTANT_DB)) / 2**17
+    columns = (ranges.received[links].tolist(), amplitude.tolist(), energy.tolist())
     return tuple(
-        reception_with_powers(
-            float(ranges.first_path_power_dbm[link]),
-            float(ranges.receive_power_dbm[link]),
-            constants.PREAMBLE_COUNT_1024,
-            PRF_MHZ,
-        )
-        if ranges.received[link]
-        else Reception()
-        for link in links
+        _reception(round(first), round(total), symbols) if received else Reception()
+        for received, first, total in zip(*columns, strict=True)
+    )
+
+
+def _reception(amplitude: int, energy: int, symbols: int) -> Reception:
+    """Registers that say no more than the powers."""
+    first = min(amplitude, 0xFFFF)
+    return Reception(
+        first_path_amplitude=(first, first, first),
+        receive_power_counts=min(energy, 0xFFFF),
+        preamble_count=symbols,
+        prf_mhz=PRF_MHZ,
     )
 
 
