@@ -28,6 +28,7 @@ _SHARED_BIAS_SD_M = (
 _YAW_BASELINE_M = 3.0
 _MAX_PREDICTION_S = 600.0
 _FARTHEST_M = 1e8  # beyond any map, grid coordinates included
+_LARGEST_SD_M = 1e4  # a position that is no surer says nothing
 _LONGEST_STEP_M = 5.0
 
 
@@ -100,10 +101,10 @@ class PoseFilter:
 
     def _use_position(self, fix: PositionFix, stamp_ns: int) -> Verdict:
         R = fix.covariance_m2 + np.eye(2) * _MIN_POSITION_SD_M**2
-        R = (R + R.T) / 2.0
-        finite = np.abs(fix.position_m).max() < _FARTHEST_M and np.abs(R).max() < _FARTHEST_M**2  # false for NaN
-        if not finite or np.linalg.eigvalsh(R)[0] <= 0.0:
+        finite = np.abs(fix.position_m).max() < _FARTHEST_M and np.abs(R).max() < _LARGEST_SD_M**2  # false for NaN
+        if not finite or np.linalg.eigvalsh(R + R.T)[0] <= 0.0:
             return Verdict(Source.UWB_POSE, 0, Reason.INVALID)
+        R = (R + R.T) / 2.0
         if self._stamp_ns is None:
             self._begin(fix.position_m, R, stamp_ns)
             return Verdict(Source.UWB_POSE, 0, Reason.ACCEPTED)
@@ -159,8 +160,8 @@ class PoseFilter:
         H[0, 2] = H[1, 3] = 1.0
         H[:, 4] = -speed * across
         R = (
-            np.outer(along, along) * step.length_variance_m2 / step.interval_s**2
-            + np.outer(across, across) * speed**2 * step.heading_variance_rad2
+            np.outer(along, along) * min(step.length_variance_m2, _LONGEST_STEP_M**2) / step.interval_s**2
+            + np.outer(across, across) * speed**2 * min(step.heading_variance_rad2, math.pi**2)
             + np.eye(2) * _STEP_VELOCITY_SD_MS**2
         )
         self._correct(speed * along - self._x[2:4], H, R)

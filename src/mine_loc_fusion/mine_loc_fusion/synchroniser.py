@@ -145,7 +145,7 @@ class Synchroniser:
             self.used -= lost
             self.refused[Reason.OVERFLOW] += lost
 
-    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:  # noqa: PLR0911 a ladder of refusals
+    def _judge(self, person: _Person, item: SyncInput, now_ns: int) -> Reason:
         if item.stamp_ns > now_ns + self._future_ns:
             return Reason.FUTURE
         identity = (item.kind, item.source, item.seq, item.stamp_ns)
@@ -154,9 +154,8 @@ class Synchroniser:
         newest_ns = person.newest_of_source.get((item.kind, item.source))
         if newest_ns is not None and item.stamp_ns < newest_ns:
             return Reason.BACKWARD
-        if person.forgotten_ns is not None and item.stamp_ns <= person.forgotten_ns:
-            return Reason.STALE
-        if person.last_stamp_ns is not None and item.stamp_ns < person.last_stamp_ns - self._history_ns:
+        forgotten = person.forgotten_ns is not None and item.stamp_ns <= person.forgotten_ns
+        if forgotten or (person.last_stamp_ns is not None and item.stamp_ns < person.last_stamp_ns - self._history_ns):
             return Reason.STALE
         epoch = person.open.get(item.stamp_ns)
         if epoch is not None and len(epoch.inputs.get(item.kind, ())) >= CAPACITY[item.kind]:

@@ -102,7 +102,7 @@ def test_without_inputs_the_covariance_grows_until_the_person_is_lost_and_the_po
     subject = standing()
     estimates = [subject.estimate(at(5 + seconds)) for seconds in (0, 1, 2, 5, 20, 100, 600, 3600)]
     areas = [np.linalg.det(estimate.covariance[:2, :2]) for estimate in estimates]
-    assert all(a < b for a, b in itertools.pairwise(areas))
+    assert all(a < b for a, b in itertools.pairwise(areas[:7]))
     assert areas[7] >= areas[6]
     modes = [estimate.mode for estimate in estimates]
     assert modes[0] is Mode.UWB_ONLY
