@@ -1,8 +1,10 @@
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup demo test check nightly lock clean
+.PHONY: help setup demo test check nightly bench-sim lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
+SITE ?=
+PEOPLE ?= 3
 run = . ./env.sh &&
 
 help:            ## list the targets
@@ -11,17 +13,22 @@ help:            ## list the targets
 setup:           ## install and build (demo and test do it themselves)
 	@tools/setup.sh
 
-demo: setup      ## play a recording through the live graph (RECORDING=m1l|isas_walk1|generated, DEMO_SECONDS=60)
-	@$(run) mine-loc demo --recording "$(RECORDING)" --seconds "$(DEMO_SECONDS)"
+demo: setup      ## the live graph on a recording (RECORDING=m1l|isas_walk1|generated) or a simulated SITE=config/…
+	@$(run) mine-loc demo --recording "$(RECORDING)" --seconds "$(DEMO_SECONDS)" \
+	    $(if $(SITE),--site "$(SITE)") --people "$(PEOPLE)"
 
 test: setup      ## all checks: style, types, unit, live graph and fault tests
-	@$(run) ruff format --check --quiet src tests && ruff check src tests && mypy && pytest
+	@$(run) ruff format --check --quiet src tests bench && ruff check src tests bench && mypy && pytest
 
 check: setup     ## style and types only
-	@$(run) ruff format --check --quiet src tests && ruff check src tests && mypy
+	@$(run) ruff format --check --quiet src tests bench && ruff check src tests bench && mypy
 
-nightly: setup   ## the tests with ten million random bytes for the decoders
+nightly: setup   ## ten million random bytes for the decoders, ten minutes of ten simulated people
 	@$(run) MINE_LOC_FUZZ_BYTES=10000000 pytest tests/fuzz
+	@$(run) MINE_LOC_SIM_SECONDS=600 pytest --timeout 600 tests/unit/mine_loc_sim/test_byte_streams.py
+
+bench-sim: setup ## the simulator against its models and real data (bench/results/sim.json)
+	@$(run) python bench/sim.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

@@ -4,7 +4,6 @@ import itertools
 import signal
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import psutil
 import pytest
@@ -39,12 +38,6 @@ def heard(graph: LiveGraph) -> dict[str, Heard]:
     return {node: graph.observer.listen(*what) for node, what in OUTPUT_OF.items()}
 
 
-def time_in_run_queue_s(pid: int) -> float:
-    """How long a process was ready to run while the machine ran others (Linux, proc(5)): not the node's fault."""
-    file = Path(f"/proc/{pid}/schedstat")
-    return int(file.read_text().split()[1]) / 1e9 if file.exists() else 0.0
-
-
 @pytest.mark.parametrize("node", OUTPUT_OF)
 def test_output_continues_within_three_seconds_of_the_kill(graph, heard, node, record_property):
     observer, poses, own = graph.observer, heard["fusion"], heard[node]
@@ -71,13 +64,9 @@ def test_output_continues_within_three_seconds_of_the_kill(graph, heard, node, r
 
     observer.wait_for(lambda: own.since(restarted_s) and positioned_by_uwb())
     recovered_s = time.monotonic() - killed_s
-    queued_s = time_in_run_queue_s(successor().pid)
     arrivals = [killed_s, *(at_s for at_s in poses.at_s if at_s > killed_s)]
     gap_s = max(later - earlier for earlier, later in itertools.pairwise(arrivals))
     record_property("recovered_s", round(recovered_s, 2))
-    print(
-        f"{node}: back after {recovered_s:.2f} s, fused/poses silent for {gap_s:.2f} s, "
-        f"in the run queue {queued_s:.2f} s"
-    )
-    assert recovered_s - queued_s < 3.0
-    assert gap_s - queued_s < 3.0
+    print(f"{node}: back after {recovered_s:.2f} s, fused/poses silent for {gap_s:.2f} s")
+    assert recovered_s < 3.0
+    assert gap_s < 3.0
