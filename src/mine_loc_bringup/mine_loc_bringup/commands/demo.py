@@ -45,7 +45,7 @@ _RECORDINGS: dict[str, Callable[[], Recording]] = {
     "isas_walk1": isas_walk.load,
 }
 _SIMULATED = "generated"
-_SIMULATED_SITE = "example_mine"
+_SIMULATED_SITE = "laboratory"
 _START_DEADLINE_S = 30.0
 _DRAW_PERIOD_S = 0.25
 _READY_PERIOD_S = 0.05
