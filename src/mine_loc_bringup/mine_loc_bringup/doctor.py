@@ -32,6 +32,7 @@ rclpy.create_node("doctor").create_publisher(mine_loc_interfaces.msg.PersonPoseA
 print(rclpy.get_rmw_implementation_identifier())
 """
 _STEADY_CLOCKS = {"tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"}
+RECEIVE_BUFFER_NEEDED = 4 << 20
 SHARED_MEMORY_NEEDED = 64 << 20  # Fast DDS takes about 0.5 MiB a participant; a graph of 30 nodes with room to spare
 _PARTICIPANTS = 40  # Fast DDS tries on from a taken port; half of these free will do
 _LAST_DOMAIN = 232  # the last whose ports fit below 65536
@@ -68,6 +69,7 @@ def examine() -> list[Finding]:
         check_discovery_range(os.environ),
         check_ports(os.environ.get("ROS_DOMAIN_ID") or "0"),
         check_shared_memory(),
+        check_receive_buffer(),
         check_cores(len(os.sched_getaffinity(0))),
         check_clock_source(),
         check_date(time.gmtime()),
@@ -186,6 +188,13 @@ def check_shared_memory(folder: Path = Path("/dev/shm")) -> Finding:  # noqa: S1
     free = shutil.disk_usage(folder).free
     remedy = f"at least {SHARED_MEMORY_NEEDED >> 20} MiB (containers: --shm-size=256m)"
     return _judged("shared memory", free >= SHARED_MEMORY_NEEDED, f"{free >> 20} MiB free in {folder}", remedy)
+
+
+def check_receive_buffer(file: Path = Path("/proc/sys/net/core/rmem_max")) -> Finding:
+    """Room for the datagrams of discovery, which a restarted node gets all at once (`fast_discovery.xml`)."""
+    room = int(file.read_text()) if file.is_file() else 0
+    remedy = f"sysctl -w net.core.rmem_max={RECEIVE_BUFFER_NEEDED}, else a restarted node is found seconds later"
+    return _judged("receive buffer", room >= RECEIVE_BUFFER_NEEDED, f"at most {room >> 10} KiB", remedy)
 
 
 def check_cores(cores: int) -> Finding:

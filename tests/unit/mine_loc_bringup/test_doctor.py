@@ -126,3 +126,13 @@ class TestCommand:
         assert report["missing"] == ["c"]
         assert report["findings"][1] == {"subject": "c", "grade": "missing", "found": "not here", "remedy": "get it"}
         assert "get it" in capsys.readouterr().out
+
+
+def test_a_small_receive_buffer_is_named_with_the_command_that_widens_it(tmp_path):
+    file = tmp_path / "rmem_max"
+    file.write_text("212992\n")
+    finding = doctor.check_receive_buffer(file)
+    assert finding.grade is Grade.DOUBTFUL
+    assert "net.core.rmem_max=4194304" in finding.remedy
+    file.write_text("4194304\n")
+    assert doctor.check_receive_buffer(file).grade is Grade.GOOD

@@ -36,6 +36,7 @@ class SynchroniserNode(NodeBase):
         self._people = PeopleFile(folder)
         self._synchroniser = self._new_synchroniser()
         self._unknown_tags: dict[int, int] = {}
+        self._refused_before: dict[str, int] = {}
         self._epochs = self.publish_to(msg.Epoch, "sync/epochs", EVENTS)
         self.every(_POLL_PERIOD_S, self._poll)
         self.every(_PEOPLE_PERIOD_S, self._reload_people)
@@ -63,7 +64,8 @@ class SynchroniserNode(NodeBase):
         """Inputs used, late, and refused by cause."""
         synchroniser = self._synchroniser
         refused = {reason.name.lower(): count for reason, count in synchroniser.refused.items()}
-        level = Level.WARN if refused else Level.OK
+        level = Level.WARN if refused != self._refused_before else Level.OK
+        self._refused_before = refused
         yield Health("inputs", level, "aligning", {"used": synchroniser.used, "late": synchroniser.late} | refused)
         if self._unknown_tags:
             yield Health("tags", Level.WARN, "tags that nobody in people.yaml wears", self._unknown_tags)

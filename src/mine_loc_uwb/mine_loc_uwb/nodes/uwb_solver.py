@@ -2,6 +2,7 @@
 
 import math
 import sys
+import time
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -20,7 +21,8 @@ from mine_loc_uwb.fix import Fix, FixStatus
 from mine_loc_uwb.parameters import UwbSolverParameters
 from mine_loc_uwb.round_solver import MeasuredRange, RoundSolver
 
-_PEOPLE_PERIOD_S = 1.0
+_PERIOD_S = 1.0
+_FORGET_AFTER_S = 60.0
 
 
 class UwbSolver(NodeBase):
@@ -42,8 +44,9 @@ class UwbSolver(NodeBase):
         self._map = self.publish_to(AnchorMap, "uwb/anchors", LATCHED)
         self._map_version = 0
         self._rounds = self._fixes = 0
+        self._heard_s: dict[int, float] = {}
         self.serve(SetAnchorEnabled, "~/set_anchor_enabled", self._set_anchor_enabled)
-        self.every(_PEOPLE_PERIOD_S, self._reload_people)
+        self.every(_PERIOD_S, self._each_second)
         self.subscribe(UwbRangeArray, "uwb/ranges", self._on_round, EVENTS)
 
     def activate(self) -> None:
@@ -61,12 +64,17 @@ class UwbSolver(NodeBase):
         if self._people.error:
             yield Health("people.yaml", Level.WARN, self._people.error)
 
-    def _reload_people(self) -> None:
+    def _each_second(self) -> None:
         self._people.poll()
+        now_s = time.monotonic()
+        for tag_id in [tag_id for tag_id, heard_s in self._heard_s.items() if now_s - heard_s > _FORGET_AFTER_S]:
+            del self._heard_s[tag_id]
+            self._solver.forget(tag_id)
 
     def _on_round(self, array: UwbRangeArray) -> None:
         ranges = [MeasuredRange(item.anchor_id, item.range, item.range_variance) for item in array.ranges]
         fix, verdicts = self._solver.solve(array.tag_id, ranges, self._height_m(array.tag_id))
+        self._heard_s[array.tag_id] = time.monotonic()
         self._rounds += 1
         self._fixes += fix.status is FixStatus.OK
         rejected = sum(not verdict.accepted for verdict in verdicts)
