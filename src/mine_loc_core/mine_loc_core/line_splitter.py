@@ -30,10 +30,10 @@ class LineSplitter:
         *pieces, self._tail = self._boundary.split(self._tail + data)
         lines = []
         for piece in pieces:
-            if not self._overlong(piece) and (line := piece.strip()):
+            if not self._overlong(piece, self._max_length) and (line := piece.strip()):
                 lines.append(line.decode("ascii", "replace"))
             self._dropping = False
-        if self._overlong(self._tail):
+        if self._overlong(self._tail, self._max_length + self.CONTEXT):  # its end may be the start of a boundary
             self._tail = self._tail[-self.CONTEXT :]
         return lines
 
@@ -44,8 +44,8 @@ class LineSplitter:
         self._tail = b""
         self._dropping = False
 
-    def _overlong(self, piece: bytes) -> bool:
-        if not self._dropping and len(piece) > self._max_length:
+    def _overlong(self, piece: bytes, limit: int) -> bool:
+        if not self._dropping and len(piece) > limit:
             self.losses["overlong_line"] += 1
             self._dropping = True
         return self._dropping

@@ -44,7 +44,7 @@ def test_an_overlong_line_is_dropped_whole_and_counted_once(splitter):
 def test_memory_stays_bounded_on_a_stream_without_line_ends(splitter):
     for _ in range(1000):
         splitter.feed(b"y" * 100)
-        assert len(splitter._tail) <= MAX_LENGTH
+        assert len(splitter._tail) <= MAX_LENGTH + LineSplitter.CONTEXT
     assert splitter.losses == {"overlong_line": 1}
 
 
@@ -53,6 +53,12 @@ def test_reset_forgets_a_partial_line_and_counts_it(splitter):
     splitter.reset()
     assert splitter.feed(b"one\n") == ["one"]
     assert splitter.losses == {"partial_line": 1}
+
+
+def test_a_line_of_full_length_survives_a_start_that_comes_in_pieces(splitter):
+    lines = [line for byte in b"z" * (MAX_LENGTH - 1) + b"mc 1\n" for line in splitter.feed(bytes([byte]))]
+    assert lines == ["z" * (MAX_LENGTH - 1), "mc 1"]
+    assert not splitter.losses
 
 
 pieces = st.lists(
