@@ -1,5 +1,6 @@
 .DEFAULT_GOAL := help
 SHELL := bash
+export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
 .PHONY: help setup demo test check nightly bench-sim lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
