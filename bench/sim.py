@@ -3,8 +3,8 @@
     python bench/sim.py [--json FILE] [--only chain emulators channel gait] [--seconds S]
 
 `channel` is bench/sim_channel.py and `gait` bench/sim_gait.py (both need MINE_LOC_DATA for what is compared with
-recordings); `chain` is the speed of radio, walkers and inertial sensors together on one core; `emulators` counts what
-the drivers' decoders lose of ten people at full rate.
+recordings); `chain` is the speed of radio, walkers and inertial sensors together on one core, inertial frames as
+payloads; `emulators` counts what the drivers' decoders lose of ten people at full rate, byte by byte.
 """
 
 import argparse

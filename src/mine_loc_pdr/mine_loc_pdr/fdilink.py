@@ -8,8 +8,11 @@ are described in docs/wire-formats.md. All values keep the device's units and ax
 import binascii
 import struct
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
+
+import numpy as np
 
 from mine_loc_core.framing import INCOMPLETE, Damaged, Found, FrameScanner, Incomplete
 
@@ -26,6 +29,10 @@ _OVERHEAD = 8
 _IMU = struct.Struct("<12fq")
 _AHRS = struct.Struct("<10fq")
 _RAW_SENSORS = struct.Struct("<12f")
+IMU_ROW = np.dtype([("values", "<f4", 12), ("timestamp_us", "<i8")])
+"""A payload of 0x40 as a row of an array: `values` in the order of ImuFrame's fields."""
+AHRS_ROW = np.dtype([("values", "<f4", 10), ("timestamp_us", "<i8")])
+"""A payload of 0x41 as a row of an array: `values` in the order of AhrsFrame's fields."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,16 +141,32 @@ class FdilinkDecoder:
     def _content(self, kind: int, length: int, buffer: bytearray, body: int) -> Frame | None:
         """Dispatch on type and length together: firmware generations give one type several lengths."""
         if kind == IMU and length == _IMU.size:
-            v = _IMU.unpack_from(buffer, body)
-            return ImuFrame(v[0:3], v[3:6], v[6:9], v[9], v[10], v[11], v[12])
+            return _imu_frame(_IMU.unpack_from(buffer, body))
         if kind == AHRS and length == _AHRS.size:
-            v = _AHRS.unpack_from(buffer, body)
-            return AhrsFrame(v[0:3], v[3:6], v[6:10], v[10])
+            return _ahrs_frame(_AHRS.unpack_from(buffer, body))
         if kind == RAW_SENSORS and length == _RAW_SENSORS.size:
             v = _RAW_SENSORS.unpack_from(buffer, body)
             return RawSensorsFrame(v[0:3], v[3:6], v[6:9], v[9], v[10], v[11])
         self.skipped_types[kind] += 1
         return None
+
+
+def imu_frames(payloads: bytes) -> Iterator[ImuFrame]:
+    """Frames of payloads of 0x40 that follow one another without anything between."""
+    return map(_imu_frame, _IMU.iter_unpack(payloads))
+
+
+def ahrs_frames(payloads: bytes) -> Iterator[AhrsFrame]:
+    """Frames of payloads of 0x41 that follow one another without anything between."""
+    return map(_ahrs_frame, _AHRS.iter_unpack(payloads))
+
+
+def _imu_frame(v: tuple[Any, ...]) -> ImuFrame:
+    return ImuFrame(v[0:3], v[3:6], v[6:9], v[9], v[10], v[11], v[12])
+
+
+def _ahrs_frame(v: tuple[Any, ...]) -> AhrsFrame:
+    return AhrsFrame(v[0:3], v[3:6], v[6:10], v[10])
 
 
 def _payload_problem(buffer: bytearray, offset: int, length: int) -> Incomplete | Damaged | None:

@@ -1,6 +1,6 @@
 """The frames of a scene as the bytes that arrive over each serial line, and when."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,7 +60,7 @@ class LineEmitter:
         self._rng = rng
         self._last_ns = 0
 
-    def emit(self, frames: Sequence[Timed], stop_ns: int) -> Iterator[Arrival]:
+    def emit(self, frames: Collection[Timed], stop_ns: int) -> Iterator[Arrival]:
         """Yield what arrives of frames that were measured in order, all before `stop_ns`."""
         jitter_ns = self._rng.exponential(self._jitter_ns, len(frames)).astype(np.int64).tolist()
         for (stamp_ns, frame), late_ns in zip(frames, jitter_ns, strict=True):

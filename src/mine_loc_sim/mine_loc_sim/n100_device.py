@@ -2,12 +2,15 @@
 
 import itertools
 import math
+from collections.abc import Collection, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mine_loc_core.stamps import NS_PER_US
+from mine_loc_pdr import fdilink
 from mine_loc_pdr.fdilink import AhrsFrame, ImuFrame
 from mine_loc_sim import scene_constants as sc
 from mine_loc_sim.ahrs_output import AhrsOutput
@@ -18,6 +21,34 @@ from mine_loc_sim.walker import Walker
 
 _RATE_HZ = 0.5e6 / sc.N100_PERIOD_US
 Timed = tuple[int, ImuFrame | AhrsFrame]
+Stamps = NDArray[np.int64]
+Rows = NDArray[Any]
+_NOTHING = np.empty(0, np.int64), np.empty(0, fdilink.IMU_ROW), np.empty(0, fdilink.AHRS_ROW)
+
+
+class N100Frames(Collection[Timed]):
+    """Frames 0x40 and 0x41 in turn with the instants of their measurements, kept as payloads until asked for.
+
+    stamp_ns: (n,); sensors, attitudes: rows of `fdilink.IMU_ROW` and `fdilink.AHRS_ROW`, n together.
+    """
+
+    def __init__(self, stamp_ns: Stamps, sensors: Rows, attitudes: Rows, *, sensors_first: bool) -> None:
+        self._stamp_ns, self._sensors, self._attitudes = stamp_ns, sensors, attitudes
+        self._sensors_first = sensors_first
+
+    def __len__(self) -> int:
+        return len(self._stamp_ns)
+
+    def __iter__(self) -> Iterator[Timed]:
+        turns: list[Iterator[ImuFrame | AhrsFrame]] = [
+            fdilink.imu_frames(self._sensors.tobytes()),
+            fdilink.ahrs_frames(self._attitudes.tobytes()),
+        ]
+        pairs = itertools.zip_longest(*(turns if self._sensors_first else reversed(turns)))
+        return zip(self._stamp_ns.tolist(), itertools.chain.from_iterable(pairs), strict=False)
+
+    def __contains__(self, frame: object) -> bool:
+        return any(each == frame for each in self)
 
 
 class N100Device:
@@ -36,37 +67,43 @@ class N100Device:
         self._phase = clock.random()
         self._sent = 0
 
-    def frames(self, stop_ns: int) -> list[Timed]:
+    def frames(self, stop_ns: int) -> "N100Frames":
         """Return the next frames with the instants of their measurements, until before `stop_ns`."""
         count = max(0, math.ceil(stop_ns / self._period_ns - self._phase) - self._sent)
         if not count:
-            return []
+            return N100Frames(*_NOTHING, sensors_first=True)
         number = self._sent + np.arange(count)
         self._sent += count
         stamps = np.rint((number + self._phase) * self._period_ns).astype(np.int64)
         motion = self._walker.motion(stamps)
         device_us = self._first_us + number * sc.N100_PERIOD_US
-        sensors = number % 2 == 0
-        turns: list[list[Timed]] = [[], []]
-        turns[int(number[0] % 2)] = self._sensor_frames(_pick(motion, sensors), device_us[sensors])
-        turns[1 - int(number[0] % 2)] = self._attitude_frames(_pick(motion, ~sensors), device_us[~sensors])
-        return [frame for pair in itertools.zip_longest(*turns) for frame in pair if frame is not None]
+        first = int(number[0] % 2)  # even numbers are of sensors
+        sensors, attitudes = slice(first, None, 2), slice(1 - first, None, 2)
+        return N100Frames(
+            stamps,
+            self._sensor_rows(_pick(motion, sensors), device_us[sensors]),
+            self._attitude_rows(_pick(motion, attitudes), device_us[attitudes]),
+            sensors_first=first == 0,
+        )
 
-    def _sensor_frames(self, motion: WaistMotion, device_us: NDArray[np.int64]) -> list[Timed]:
+    def _sensor_rows(self, motion: WaistMotion, device_us: Stamps) -> Rows:
         samples = self._imu.sample(motion, self._field.at(motion.position_m))
-        columns = (samples.gyro_rad_s, samples.accel_m_s2, samples.mag_mg, samples.temperature_c, device_us)
-        rows = zip(motion.stamp_ns.tolist(), *(column.tolist() for column in columns), strict=True)
-        return [
-            (t_ns, ImuFrame(tuple(gyro), tuple(accel), tuple(mag), warm_c, sc.ABSENT_BAROMETER_PA, warm_c, us))
-            for t_ns, gyro, accel, mag, warm_c, us in rows
-        ]
+        rows = np.empty(len(device_us), fdilink.IMU_ROW)
+        values = rows["values"]
+        values[:, 0:3], values[:, 3:6], values[:, 6:9] = samples.gyro_rad_s, samples.accel_m_s2, samples.mag_mg
+        values[:, 9] = values[:, 11] = samples.temperature_c
+        values[:, 10] = sc.ABSENT_BAROMETER_PA
+        rows["timestamp_us"] = device_us
+        return rows
 
-    def _attitude_frames(self, motion: WaistMotion, device_us: NDArray[np.int64]) -> list[Timed]:
+    def _attitude_rows(self, motion: WaistMotion, device_us: Stamps) -> Rows:
         attitude = self._ahrs.estimate(motion)
-        rates = (motion.angular_rate_rad_s @ self._to_device).astype(np.float32)
-        columns = (rates, _euler_ned(attitude), attitude, device_us)
-        rows = zip(motion.stamp_ns.tolist(), *(column.tolist() for column in columns), strict=True)
-        return [(t_ns, AhrsFrame(tuple(rate), tuple(rpy), tuple(q), us)) for t_ns, rate, rpy, q, us in rows]
+        rows = np.empty(len(device_us), fdilink.AHRS_ROW)
+        values = rows["values"]
+        values[:, 0:3] = motion.angular_rate_rad_s @ self._to_device
+        values[:, 3:6], values[:, 6:10] = _euler_ned(attitude), attitude
+        rows["timestamp_us"] = device_us
+        return rows
 
 
 def mounted(errors: DeviceErrors, mounting_rpy_rad: tuple[float, float, float]) -> DeviceErrors:
@@ -85,7 +122,7 @@ def _euler_ned(attitude_wxyz: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.column_stack([roll, pitch, heading]).astype(np.float32)
 
 
-def _pick(motion: WaistMotion, which: NDArray[np.bool_]) -> WaistMotion:
+def _pick(motion: WaistMotion, which: slice) -> WaistMotion:
     return WaistMotion(
         motion.stamp_ns[which],
         motion.position_m[which],

@@ -3,7 +3,7 @@
 Everything follows from site, people and options: same arguments, same frames. Time 0 is the beginning of the scene.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +64,7 @@ class Block:
 
     start_ns: int
     stop_ns: int
-    frames: Mapping[str, Sequence[Timed]]
+    frames: Mapping[str, Collection[Timed]]
     links: Sequence[TrueLink]
 
 
@@ -138,16 +138,15 @@ class Scenario:
             yield self._block(start_ns, min(start_ns + length_ns, stop_ns))
 
     def _block(self, start_ns: int, stop_ns: int) -> Block:
-        frames: dict[str, list[Timed]] = {line: [] for line in self.lines}
+        worn = {line_of(body.person): body.n100 for body in self._bodies.values() if body.n100 is not None}
+        inertial = {line: n100.frames(stop_ns) for line, n100 in worn.items()}
+        frames: dict[str, list[Timed]] = {line: [] for line in self.lines if line not in worn}
         links: list[TrueLink] = []
-        for body in self._bodies.values():
-            if body.n100 is not None:
-                frames[line_of(body.person)] += body.n100.frames(stop_ns)
         for person, heard in self._rounds(start_ns, stop_ns):
             links += _truth_of(person, heard, self.site)
             for line, frame in self._reporters.report(person, heard):
                 frames[line].append((heard.stamp_ns, frame))
-        return Block(start_ns, stop_ns, frames, links)
+        return Block(start_ns, stop_ns, {**frames, **inertial}, links)
 
     def _rounds(self, start_ns: int, stop_ns: int) -> list[tuple[Person, HeardRound]]:
         """All rounds of the block, in order of time. Tags have their turns one after the other within a period."""

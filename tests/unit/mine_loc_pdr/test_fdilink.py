@@ -3,19 +3,24 @@
 import random
 
 import crccheck
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_pdr.fdilink import (
+    AHRS_ROW,
+    IMU_ROW,
     AhrsFrame,
     FdilinkDecoder,
     ImuFrame,
     RawSensorsFrame,
+    ahrs_frames,
     crc8,
     crc16,
     encode,
     encode_payload,
+    imu_frames,
 )
 
 CAPTURED_IMU = bytes.fromhex(
@@ -78,6 +83,17 @@ def test_the_captured_ahrs_frame_reads_as_recorded():
 def test_a_decoded_vector_encodes_to_the_same_bytes(wire, serial):
     (frame,) = decode(wire)
     assert encode(frame, serial) == wire
+
+
+def test_rows_of_an_array_are_payloads():
+    imu, ahrs = np.zeros(2, IMU_ROW), np.zeros(2, AHRS_ROW)
+    imu["values"], imu["timestamp_us"] = [range(12), range(12, 24)], [7, 8]
+    ahrs["values"], ahrs["timestamp_us"] = [range(10), range(10, 20)], [9, 10]
+    assert list(imu_frames(imu.tobytes()))[1] == ImuFrame((12, 13, 14), (15, 16, 17), (18, 19, 20), 21, 22, 23, 8)
+    assert list(ahrs_frames(ahrs.tobytes()))[1] == AhrsFrame((10, 11, 12), (13, 14, 15), (16, 17, 18, 19), 10)
+    for row, kind in ((imu[1], 0x40), (ahrs[1], 0x41)):
+        (frame,) = decode(encode_payload(kind, row.tobytes(), 0))
+        assert encode(frame, 0) == encode_payload(kind, row.tobytes(), 0)
 
 
 def test_made_up_values_encode_to_the_published_vectors():
