@@ -1,5 +1,7 @@
 """The 40-bit clock of a DW1000: 15.65 ps ticks, an own rate that wanders, a wrap every 17.2 s."""
 
+import math
+
 import numpy as np
 
 from mine_loc_core.stamps import to_s
@@ -35,7 +37,7 @@ class DeviceTicks:
         gone_ns = stamp_ns - self._last_ns
         self._last_ns = stamp_ns
         self._extra_ticks += gone_ns * 1e-6 * self._rate_ppm * _TICKS_PER_10_MS / _NS_PER_10_MS
-        wander = constants.CRYSTAL_WANDER_PPM_PER_ROOT_S * np.sqrt(to_s(gone_ns))
+        wander = constants.CRYSTAL_WANDER_PPM_PER_ROOT_S * math.sqrt(to_s(gone_ns))
         self._rate_ppm += wander * self._rng.standard_normal()
         true_ticks = (stamp_ns - self._first_ns) * _TICKS_PER_10_MS // _NS_PER_10_MS
         return (self._start + true_ticks + round(self._extra_ticks)) % _WRAP

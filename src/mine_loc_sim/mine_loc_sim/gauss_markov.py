@@ -20,7 +20,10 @@ class GaussMarkov:
         """Advance row by row; which and step: (r, k), no doubles in a row. Returns (r x k,)."""
         kept = np.exp(-step / self._scale)
         fresh = np.sqrt(1.0 - kept**2) * self._rng.standard_normal(which.shape)
-        values = np.empty(which.shape)
-        for row, links in enumerate(which):
-            values[row] = self._value[links] = kept[row] * self._value[links] + fresh[row]
-        return values.ravel()
+        state, values = self._value.tolist(), []
+        steps = zip(which.ravel().tolist(), kept.ravel().tolist(), fresh.ravel().tolist(), strict=True)
+        for process, share, news in steps:  # row by row: numbers outrun arrays as short as these rows
+            state[process] = value = share * state[process] + news
+            values.append(value)
+        self._value = np.array(state)
+        return np.array(values)

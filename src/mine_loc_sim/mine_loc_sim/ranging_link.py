@@ -130,13 +130,16 @@ class Whereabouts:
 
     def moved(self, tag_m: Reals, anchor_m: Reals, which: Indices) -> Reals:
         """Way of both ends [m] since last use, (r, k); tag_m: (r, 3), anchor_m: (r, k, 3), which: (r, k)."""
-        ends = np.concatenate([np.broadcast_to(tag_m[:, None], anchor_m.shape), anchor_m], axis=2)
-        before = np.empty_like(ends)
-        for row, links in enumerate(which):
-            before[row] = self._last_m[links]
-            self._last_m[links] = ends[row]
-        change = (ends - before) ** 2
-        return np.asarray(np.sqrt(change[..., :3].sum(axis=2)) + np.sqrt(change[..., 3:].sum(axis=2)))
+        ends = np.concatenate([np.broadcast_to(tag_m[:, None], anchor_m.shape), anchor_m], axis=2).reshape(-1, 6)
+        links, latest = which.ravel(), dict[int, int]()
+        before = np.empty(len(links), int)
+        for number, link in enumerate(links.tolist()):
+            before[number] = latest.get(link, -1)
+            latest[link] = number
+        change = (ends - np.where(before[:, None] < 0, self._last_m[links], ends[before])) ** 2
+        self._last_m[list(latest)] = ends[list(latest.values())]
+        moved_m = np.sqrt(change[:, :3].sum(axis=1)) + np.sqrt(change[:, 3:].sum(axis=1))
+        return np.asarray(moved_m.reshape(which.shape))
 
 
 class TagLinks:

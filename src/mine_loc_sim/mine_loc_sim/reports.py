@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import nan
 
 import numpy as np
@@ -124,14 +125,14 @@ class Reporters:
         ranges = []
         for anchor, range_m, reception, rate_ppm, error_ppm in zip(*columns, strict=True):
             offset_ppm = nan if math.isnan(range_m) else rate_ppm - own_ppm + error_ppm
-            powers = powers_dbm(reception)
+            powers = _powers_dbm(reception)
             ranges.append(Range(self._ids[anchor], range_m, *powers, reception.first_path_index, offset_ppm))
         return RangingRound(tag_id, reporter_id, self._rounds[tag_id], time_us, tuple(ranges), corrected=False)
 
     def _blink(self, tag_id: int, heard: HeardRound) -> TdoaBlink:
         """Differences to the first anchor, by whose clock the blink is stamped."""
         differences = range_differences(heard.range_m, self._sync_at(heard.stamp_ns)[heard.which], 0)
-        powers = [powers_dbm(reception) for reception in heard.receptions]
+        powers = [_powers_dbm(reception) for reception in heard.receptions]
         reference = int(heard.which[0])
         others = tuple(
             TdoaDifference(self._ids[heard.which[i]], float(differences[i]), powers[i][1], powers[i][0])
@@ -143,6 +144,11 @@ class Reporters:
     def _sync_at(self, stamp_ns: int) -> NDArray[np.float64]:
         gone_s, self._sync_ns = (stamp_ns - self._sync_ns) * 1e-9, stamp_ns
         return self._sync.advance(gone_s)
+
+
+@lru_cache(1 << 13)  # without accumulators, registers come from a table and come again
+def _powers_dbm(reception: Reception) -> tuple[float, float]:
+    return powers_dbm(reception)
 
 
 def _windows(ranging: RangingRound, heard: HeardRound) -> Iterator[ReportedCir]:

@@ -1,6 +1,7 @@
 """The ranging rounds of one tag: which anchors it ranges, and what the chip reports of each exchange."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from mine_loc_uwb.received_power import Reception, Sfd
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]
 CHANNEL, PRF_MHZ = 2, 64
+_LAW_ENTRIES = 1 << 13
+"""Receptions of the range law that are kept: all of one environment, which has some 6000."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +30,7 @@ class RoundPlan:
     facing_rad: Reals  # (r,)
     which: Indices  # (r, k), numbers of the anchors, no doubles in a round
     anchor_m: Reals  # (r, k, 3), where they truly hang
-    tried: NDArray[np.bool_]  # (r, k)
+    tried: Indices  # (r,), how many of them are near enough to answer: the first ones
     ways: LinkGeometry  # of the r x k links, round by round
 
 
@@ -46,15 +49,15 @@ class HeardRound:
     accumulators: NDArray[np.complex64] | None  # (k, 1016)
 
 
-def shortest_ways(ways: LinkGeometry, candidates: Indices, count: int) -> tuple[Indices, NDArray[np.bool_]]:
+def shortest_ways(ways: LinkGeometry, candidates: Indices, count: int) -> tuple[Indices, Indices]:
     """Choose up to `count` of the candidates (r, c) of each round, those with the shortest ways.
 
-    Returns their numbers (r, k) and whether they are near enough to answer (r, k).
+    Returns their numbers (r, k), nearest first, and how many of them are near enough to answer (r,).
     """
     way_m = (ways.distance_m + ways.detour_m).reshape(candidates.shape)
     best = np.argsort(way_m, axis=1, kind="stable")[:, :count]
     rows = np.arange(len(candidates))[:, None]
-    return candidates[rows, best], way_m[rows, best] <= sc.REACH_M
+    return candidates[rows, best], (way_m[rows, best] <= sc.REACH_M).sum(axis=1)
 
 
 class TagRadio:
@@ -74,40 +77,44 @@ class TagRadio:
     def measure(self, plan: RoundPlan) -> list[HeardRound]:
         """Measure the rounds of a plan."""
         ranges = self._links.measure(plan.tag_m, plan.facing_rad, plan.anchor_m, plan.which, plan.ways)
-        return [_heard(plan, number, ranges) for number in range(len(plan.stamp_ns))]
+        receptions = _receptions(ranges)
+        rounds = enumerate(zip(plan.stamp_ns.tolist(), plan.tried.tolist(), strict=True))
+        return [_heard(plan, number, stamp_ns, tried, ranges, receptions) for number, (stamp_ns, tried) in rounds]
 
 
-def _heard(plan: RoundPlan, number: int, ranges: Ranges) -> HeardRound:
-    tried = np.flatnonzero(plan.tried[number])
-    links = number * plan.which.shape[1] + tried
-    samples = None if ranges.exchanges is None else ranges.exchanges.reception.samples[links]
+def _heard(
+    plan: RoundPlan, number: int, stamp_ns: int, tried: int, ranges: Ranges, receptions: tuple[Reception, ...]
+) -> HeardRound:
+    first = number * plan.which.shape[1]
+    links = slice(first, first + tried)
     return HeardRound(
-        int(plan.stamp_ns[number]),
+        stamp_ns,
         plan.tag_m[number],
-        plan.which[number, tried],
+        plan.which[number, :tried],
         plan.ways.distance_m[links],
         ranges.range_m[links],
         ranges.level_bias_m[links],
         ranges.link_class[links],
-        _receptions(ranges, links),
-        samples,
+        receptions[links],
+        None if ranges.exchanges is None else ranges.exchanges.reception.samples[links],
     )
 
 
-def _receptions(ranges: Ranges, links: Indices) -> tuple[Reception, ...]:
+def _receptions(ranges: Ranges) -> tuple[Reception, ...]:
     """Registers of each link; none of a reception that failed."""
     if ranges.exchanges is not None:
-        return tuple(_registers(ranges.exchanges, link) for link in links.tolist())
+        return tuple(_registers(ranges.exchanges, link) for link in range(len(ranges.range_m)))
     symbols = constants.PREAMBLE_COUNT_1024
-    amplitude = symbols * 10.0 ** (0.05 * (ranges.first_path_power_dbm[links] + constants.POWER_CONSTANT_DB)) / 3**0.5
-    energy = symbols**2 * 10.0 ** (0.1 * (ranges.receive_power_dbm[links] + constants.POWER_CONSTANT_DB)) / 2**17
-    columns = (ranges.received[links].tolist(), amplitude.tolist(), energy.tolist())
+    amplitude = symbols * 10.0 ** (0.05 * (ranges.first_path_power_dbm + constants.POWER_CONSTANT_DB)) / 3**0.5
+    energy = symbols**2 * 10.0 ** (0.1 * (ranges.receive_power_dbm + constants.POWER_CONSTANT_DB)) / 2**17
+    columns = (ranges.received.tolist(), np.rint(amplitude).tolist(), np.rint(energy).tolist())
     return tuple(
-        _reception(round(first), round(total), symbols) if received else Reception()
+        _reception(int(first), int(total), symbols) if received else Reception()
         for received, first, total in zip(*columns, strict=True)
     )
 
 
+@lru_cache(_LAW_ENTRIES)
 def _reception(amplitude: int, energy: int, symbols: int) -> Reception:
     """Registers that say no more than the powers."""
     first = min(amplitude, 0xFFFF)
