@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from mine_loc_core.quaternion import product
 from mine_loc_sim import imu_constants as ic
 from mine_loc_sim.waist_motion import WaistMotion
 
@@ -21,7 +22,7 @@ class AhrsOutput:
     """Attitude of one device at `rate_hz`; blocks in sequence, as from `Imu`."""
 
     def __init__(self, mounting: Rotation, rate_hz: float, rng: np.random.Generator) -> None:
-        self._to_body = mounting.inv()
+        self._to_body_wxyz = mounting.inv().as_quat()[[3, 0, 1, 2]]
         self._tilt_rng, self._walk_rng = rng.spawn(2)
         self._keep = math.exp(-1.0 / (rate_hz * ic.AHRS_TILT_S))
         self._memory = self._keep * ic.AHRS_TILT_SD_RAD * self._tilt_rng.standard_normal((1, 2))
@@ -37,10 +38,9 @@ class AhrsOutput:
         drift = self._drift_rad + self._walk_sd_rad * self._walk_rng.standard_normal(count)
         heading = np.cumsum(np.concatenate([[self._heading_rad], drift]))
         self._heading_rad = float(heading[-1])
-        error = Rotation.from_rotvec(np.outer(heading[:-1], [0, 0, 1])) * Rotation.from_rotvec(
-            np.pad(tilt, ((0, 0), (0, 1)))
-        )
-        attitude = error * Rotation.from_quat(motion.orientation_wxyz[:, [1, 2, 3, 0]]) * self._to_body
-        x, y, z, w = attitude.as_quat().T
+        turned = np.zeros((count, 4))
+        turned[:, 0], turned[:, 3] = np.cos(0.5 * heading[:-1]), np.sin(0.5 * heading[:-1])
+        tilted = Rotation.from_rotvec(np.pad(tilt, ((0, 0), (0, 1)))).as_quat()[:, [3, 0, 1, 2]]
+        w, x, y, z = product(product(product(turned, tilted), motion.orientation_wxyz), self._to_body_wxyz).T
         ned: Float32Array = (np.column_stack([w + z, x + y, x - y, w - z]) * math.sqrt(0.5)).astype(np.float32)
         return ned

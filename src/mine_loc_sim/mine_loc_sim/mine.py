@@ -105,7 +105,16 @@ class Ways:
         return shortest, np.where(np.isfinite(shortest), turns, 0)
 
     def _in_sight(self, free: ConvexPrisms, points_m: Floats) -> tuple[Floats, NDArray[np.int64]]:
-        """Distances to the nearest turning points, inf to those out of sight, and their numbers: (n, tried) each."""
+        """Distances to the nearest turning points, inf to those out of sight, and their numbers: (n, tried) each.
+
+        Links share their ends: each place is looked from once.
+        """
+        number = dict[tuple[float, ...], int]()
+        place = [number.setdefault(tuple(point), len(number)) for point in points_m.tolist()]
+        distance_m, near = self._sight_of(free, np.array(list(number)))
+        return distance_m[place], near[place]
+
+    def _sight_of(self, free: ConvexPrisms, points_m: Floats) -> tuple[Floats, NDArray[np.int64]]:
         distance = np.linalg.norm(points_m[:, None] - self.points_m[None], axis=2)
         near = np.argsort(distance, axis=1)[:, :_TURNING_POINTS_TRIED]
         starts = np.repeat(points_m, near.shape[1], axis=0)
@@ -166,8 +175,9 @@ class Mine:
 def _crowd_loss_db(start_m: Floats, end_m: Floats, people_m: Floats) -> Floats:
     """Loss by people on the way: full in the middle of a body, none at its edge, adding up."""
     full = 0.5 * sum(constants.BODY_LOSS_DB)
-    loss = np.zeros(len(start_m))
-    for person in range(people_m.shape[1]):
-        apart = passing_distance(people_m[:, person], start_m, end_m)
-        loss += full * np.sqrt(np.maximum(1.0 - (apart / constants.BODY_RADIUS_M) ** 2, 0.0))
-    return loss
+    middle, reach = 0.5 * (start_m + end_m)[:, None, :2], 0.5 * np.linalg.norm(end_m - start_m, axis=1)[:, None]
+    away = people_m - middle
+    link, person = np.nonzero((away**2).sum(axis=2) < (reach + constants.BODY_RADIUS_M) ** 2)
+    apart = passing_distance(people_m[link, person], start_m[link], end_m[link])
+    loss = full * np.sqrt(np.maximum(1.0 - (apart / constants.BODY_RADIUS_M) ** 2, 0.0))
+    return np.bincount(link, loss, len(start_m)).astype(np.float64)

@@ -42,16 +42,17 @@ class ConvexPrisms:
 
     def spans(self, start_m: Floats, end_m: Floats) -> Floats:
         """Parts of segments (n, 3) inside each prism: (n, p, 2) fractions of entry and exit, (0, 0) where none."""
-        planes = self.normals.reshape(-1, 3).T
-        shape = (len(start_m), *self.offsets.shape)
-        height = (start_m @ planes).reshape(shape) - self.offsets
-        climb = ((end_m - start_m) @ planes).reshape(shape)
-        flat = np.abs(climb) < _FLAT
+        planes = self.normals.transpose(1, 0, 2).reshape(-1, 3)  # a row an edge, for folding whole arrays over them
+        shape = (*self.offsets.T.shape, len(start_m))
+        height = (planes @ start_m.T).reshape(shape) - self.offsets.T[..., None]
+        climb = (planes @ (end_m - start_m).T).reshape(shape)
+        rising, falling = climb >= _FLAT, climb <= -_FLAT
+        flat = ~(rising | falling)
         crossing = -height / np.where(flat, 1.0, climb)
-        entry = np.where(~flat & (climb > 0.0), crossing, 0.0).max(axis=2)
-        leave = np.where(~flat & (climb < 0.0), crossing, 1.0).min(axis=2)
-        empty = (leave <= entry) | (flat & (height < 0.0)).any(axis=2)
-        return np.where(empty[..., None], 0.0, np.clip(np.stack([entry, leave], axis=-1), 0.0, 1.0))
+        entry = np.where(rising, crossing, 0.0).max(axis=0)
+        leave = np.where(falling, crossing, 1.0).min(axis=0)
+        empty = (leave <= entry) | (flat & (height < 0.0)).any(axis=0)
+        return np.where(empty[..., None], 0.0, np.clip(np.stack([entry, leave], axis=-1), 0.0, 1.0)).swapaxes(0, 1)
 
 
 def contains(prisms: ConvexPrisms, points_m: Floats) -> NDArray[np.bool_]:
