@@ -4,7 +4,7 @@ setup(
     name="mine_loc_sim",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"mine_loc_sim": ["py.typed"]},
+    package_data={"mine_loc_sim": ["py.typed", "range_law_industrial.npz"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/mine_loc_sim"]),
         ("share/mine_loc_sim", ["package.xml"]),
