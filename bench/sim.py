@@ -58,7 +58,7 @@ def chain_speed(people: int, options: SceneOptions) -> dict[str, float]:
 def chain() -> dict[str, Any]:
     """4 links at 10 Hz and an N100 at 100 Hz a person."""
     fast = SceneOptions(seed=1, seconds=60.0)
-    list(scenario(1, SceneOptions(seconds=1.0)).blocks())  # learns the range law, once a process
+    list(scenario(1, SceneOptions(seconds=1.0)).blocks())  # reads the range law and its receptions, once a process
     speeds = {
         "with_cir": chain_speed(4, SceneOptions(seed=1, seconds=10.0, cir=True)),
         "without_cir": chain_speed(10, fast),

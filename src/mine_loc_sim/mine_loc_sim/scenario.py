@@ -132,7 +132,9 @@ class Scenario:
 
     def blocks(self) -> Iterator[Block]:
         """Play the scene, once; a block is made when it is asked for."""
-        length_ns = sc.BLOCK_WITH_CIR_NS if self.options.cir else sc.BLOCK_NS
+        share_ns = sc.PERSON_NS_A_BLOCK // max(len(self.people), 1)
+        length_ns = min(max(share_ns, sc.SHORTEST_BLOCK_NS), sc.LONGEST_BLOCK_NS)
+        length_ns = sc.BLOCK_WITH_CIR_NS if self.options.cir else length_ns
         stop_ns = to_ns(self.options.seconds)
         for start_ns in range(0, stop_ns, length_ns):
             yield self._block(start_ns, min(start_ns + length_ns, stop_ns))

@@ -3,7 +3,8 @@
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 
 # Blocks in which a scene is made: a trade of memory and of the delay before the first byte against speed.
-BLOCK_NS = 5 * NS_PER_S
+SHORTEST_BLOCK_NS, LONGEST_BLOCK_NS = 5 * NS_PER_S, 20 * NS_PER_S
+PERSON_NS_A_BLOCK = 200 * NS_PER_S
 BLOCK_WITH_CIR_NS = NS_PER_S
 
 # Ranging
