@@ -114,7 +114,8 @@ class Reporters:
             return lines[0] if lines else None
         if len(anchors) == 1:
             return anchors[0]
-        return min(anchors, key=lambda line: math.dist(self._places_m[line.name], heard.tag_m))
+        tag_m = heard.tag_m.tolist()
+        return min(anchors, key=lambda line: math.dist(self._places_m[line.name], tag_m))
 
     def _ranging(
         self, tag_id: int, reporter_id: int, time_us: int, heard: HeardRound, rates_ppm: Sequence[float]
