@@ -5,9 +5,11 @@ leaves the convex hull of its control points (de Boor, A Practical Guide to Spli
 gallery stays inside it.
 """
 
+import math
+
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, PPoly
 
 Array = npt.NDArray[np.float64]
 DEGREE = 5
@@ -23,13 +25,20 @@ class SmoothCurve:
         padded = np.pad(controls, ((DEGREE + 1, DEGREE + 1), (0, 0)), mode="edge")
         knots = start_s + spacing_s * (np.arange(len(padded) + DEGREE + 1) - DEGREE - 1 - (DEGREE + 1) / 2)
         self._low, self._high = knots[DEGREE], knots[-DEGREE - 1]
-        spline = BSpline(knots, padded, DEGREE)
-        self._derivatives = (spline, spline.derivative(1), spline.derivative(2))
+        curve = _piecewise(BSpline(knots, padded, DEGREE))
+        self._derivatives = (curve, curve.derivative(1), curve.derivative(2))
 
     def __call__(self, t_s: Array, derivative: int = 0) -> Array:
         """Value or derivative (0, 1, 2) at the instants `t_s` (n,), as (n, m)."""
         values: Array = self._derivatives[derivative](np.clip(t_s, self._low, self._high))
         return values
+
+
+def _piecewise(spline: BSpline) -> PPoly:
+    """The same curve as a polynomial a segment (Taylor's, at its beginning), which is evaluated faster."""
+    borders = spline.t[DEGREE:-DEGREE]
+    powers = range(DEGREE, -1, -1)
+    return PPoly(np.stack([spline(borders[:-1], nu=power) / math.factorial(power) for power in powers]), borders)
 
 
 def white_control_gain(derivative: int) -> float:
