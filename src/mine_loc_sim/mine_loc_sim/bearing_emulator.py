@@ -1,6 +1,7 @@
 """Direction-finding monitors that listen to moving emitters: what each reports, when it says so, and the truth.
 
 All monitors scan the channels in step, so reports of one emission bear one stamp, which is what paper E associates by.
+Bearings are straight: neither rock nor walls bend, weaken or mirror them.
 """
 
 import math
