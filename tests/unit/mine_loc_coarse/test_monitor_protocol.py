@@ -83,6 +83,11 @@ def test_a_report_comes_back_rounded_to_the_digits_of_the_line(report: BearingRe
     assert encode_report(back) == encode_report(report)
 
 
+@pytest.mark.parametrize("yaw_deg", [90.004, 90.0, 89.996, 450.0])
+def test_an_azimuth_that_rounds_to_full_circle_is_north(yaw_deg: float):
+    assert b",000.00," in encode_report(replace(REPORT, azimuth_rad=math.radians(yaw_deg)))
+
+
 @pytest.mark.parametrize(
     "change",
     [
