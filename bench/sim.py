@@ -13,6 +13,7 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 import sim_channel
 import sim_gait
 
+from mine_loc_coarse import monitor_protocol
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
 from mine_loc_pdr.fdilink import FdilinkDecoder
 from mine_loc_sim.byte_streams import byte_blocks
 from mine_loc_sim.scenario import Scenario
-from mine_loc_sim.scene import SceneOptions, crew, wire_format
+from mine_loc_sim.scene import SceneOptions, crew, line_formats
 from mine_loc_uwb.wire.detect import make_decoder
 
 HERE = Path(__file__).parent
@@ -70,8 +72,9 @@ def chain() -> dict[str, Any]:
 def emulators(seconds: float) -> dict[str, Any]:
     """Decode ten people at full rate; losses of all lines together, by kind, and what was decoded."""
     scene = scenario(10, SceneOptions(seed=1, seconds=seconds, tdoa=True))
-    formats = {receiver.name: wire_format(receiver) for receiver in scene.site.uwb_receivers}
-    decoders = {line: make_decoder(formats[line]) if line in formats else FdilinkDecoder() for line in scene.lines}
+    others: dict[str, Callable[[], Any]] = {"fdilink": FdilinkDecoder, "mldf": monitor_protocol.decoder}
+    formats = line_formats(scene.site, scene.people)
+    decoders = {line: others[each]() if each in others else make_decoder(each) for line, each in formats.items()}
     decoded: Counter[str] = Counter()
     began = time.process_time()
     for block in byte_blocks(scene):

@@ -5,15 +5,18 @@ MINE_LOC_FUZZ_BYTES sets the number of bytes, spread over all decoders; the seed
 
 import os
 import random
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from mine_loc_coarse import monitor_protocol
 from mine_loc_uwb.wire.detect import FORMATS, AutoDetect, make_decoder
 
-CORPUS = {path.stem: path.read_bytes() for path in sorted(Path(__file__).with_name("corpus").glob("uwb_*.bin"))}
+CORPUS = {path.stem: path.read_bytes() for path in sorted(Path(__file__).with_name("corpus").glob("*.bin"))}
+DECODERS = {f"uwb_{name}": partial(make_decoder, name) for name in FORMATS} | {"monitor": monitor_protocol.decoder}
 TOTAL_BYTES = int(os.environ.get("MINE_LOC_FUZZ_BYTES", "1000000"))
-NAMES = (*FORMATS, "auto")
+NAMES = (*DECODERS, "auto")
 BURST = 20_000
 FLUSH = bytes(4200) + b"\r\n"
 """Completes any frame a decoder may be waiting for."""
@@ -56,7 +59,7 @@ def feed_in_chunks(decoder, data, rng):
 
 
 def test_the_corpus_has_a_file_for_every_format():
-    assert set(CORPUS) == {f"uwb_{name}" for name in FORMATS}
+    assert set(CORPUS) == set(DECODERS)
 
 
 @pytest.mark.timeout(900)
@@ -65,7 +68,7 @@ def test_hostile_bytes_neither_raise_nor_blind_the_decoder(name):
     rng = random.Random(f"fuzz {name}")
     fed = 0
     while fed < TOTAL_BYTES / len(NAMES):
-        decoder = AutoDetect() if name == "auto" else make_decoder(name)
+        decoder = AutoDetect() if name == "auto" else DECODERS[name]()
         data = burst(rng)
         feed_in_chunks(decoder, data, rng)
         fed += len(data)
@@ -73,5 +76,5 @@ def test_hostile_bytes_neither_raise_nor_blind_the_decoder(name):
             continue
         assert decoder.losses, "a burst of damage must be counted"
         decoder.feed(FLUSH)
-        good = CORPUS[f"uwb_{name}"]
-        assert list(map(str, decoder.feed(good)))[-3:] == list(map(str, make_decoder(name).feed(good)))[-3:]
+        good = CORPUS[name]
+        assert list(map(str, decoder.feed(good)))[-3:] == list(map(str, DECODERS[name]().feed(good)))[-3:]

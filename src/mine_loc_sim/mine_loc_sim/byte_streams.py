@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from mine_loc_coarse.bearing_report import BearingReport
+from mine_loc_coarse.monitor_protocol import encode_report
 from mine_loc_core.site import Point3, Site, UwbReceiver
 from mine_loc_pdr import fdilink
 from mine_loc_pdr.fdilink import AhrsFrame, ImuFrame
@@ -12,7 +14,7 @@ from mine_loc_sim import scene_constants as sc
 from mine_loc_sim.faults import Fault, LineFaults
 from mine_loc_sim.reports import ReportedCir, ReportedRound
 from mine_loc_sim.scenario import Frame, Scenario, Timed
-from mine_loc_sim.scene import wire_format
+from mine_loc_sim.scene import line_formats, wire_format
 from mine_loc_sim.timed_bytes import Arrival
 from mine_loc_uwb.ranging import RangingRound, TdoaBlink
 from mine_loc_uwb.wire.dwm1001_shell import encode_lec
@@ -37,15 +39,19 @@ def byte_blocks(scenario: Scenario, faults: Sequence[Fault] = ()) -> Iterator[Ma
 
 def line_emitters(scenario: Scenario, faults: Sequence[Fault] = ()) -> dict[str, "LineEmitter"]:
     """Return the emitter of each line of a scenario."""
-    site = scenario.site
-    receivers = {receiver.name: receiver for receiver in site.uwb_receivers}
+    receivers = {receiver.name: receiver for receiver in scenario.site.uwb_receivers}
+    formats = line_formats(scenario.site, scenario.people)
     seeds = np.random.SeedSequence([_FAULT_SEED, scenario.options.seed]).spawn(len(scenario.lines))
     emitters = {}
     for line, seed in zip(scenario.lines, seeds, strict=True):
         rng = np.random.default_rng(seed)
-        uwb = receivers.get(line)
-        encode = N100Encoder() if uwb is None else uwb_encoder(uwb, site)
-        delay = (sc.N100_DELAY_NS, sc.N100_JITTER_NS) if uwb is None else (sc.UWB_DELAY_NS, sc.UWB_JITTER_NS)
+        encode: Encode
+        if formats[line] == "fdilink":
+            encode, delay = N100Encoder(), (sc.N100_DELAY_NS, sc.N100_JITTER_NS)
+        elif formats[line] == "mldf":
+            encode, delay = encode_bearing, (0, 0)  # the emulator has delayed its reports itself
+        else:
+            encode, delay = uwb_encoder(receivers[line], scenario.site), (sc.UWB_DELAY_NS, sc.UWB_JITTER_NS)
         emitters[line] = LineEmitter(encode, delay, LineFaults(line, faults, rng), rng)
     return emitters
 
@@ -143,6 +149,13 @@ class N100Encoder:
             raise TypeError(f"{type(frame).__name__} does not come from an N100")
         self._serial = (self._serial + 1) % 256
         return fdilink.encode(frame, self._serial)
+
+
+def encode_bearing(frame: Frame) -> bytes:
+    """Encode a monitor's report."""
+    if not isinstance(frame, BearingReport):
+        raise TypeError(f"{type(frame).__name__} does not come from a monitor")
+    return encode_report(frame)
 
 
 def corrected(frame: Frame) -> RangingRound:

@@ -11,8 +11,9 @@ from enum import Enum
 
 import numpy as np
 
+from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.stamps import to_ns
+from mine_loc_core.stamps import NS_PER_US, to_ns
 from mine_loc_pdr.fdilink import AhrsFrame, ImuFrame, Vector3
 from mine_loc_sim import imu_constants as ic
 from mine_loc_sim import scene_constants as sc
@@ -163,6 +164,8 @@ class LineFaults:
 def _stepped(frame: Frame) -> Frame:
     if isinstance(frame, ImuFrame | AhrsFrame):
         return replace(frame, timestamp_us=frame.timestamp_us + sc.CLOCK_STEP_US)
+    if isinstance(frame, BearingReport):
+        return replace(frame, stamp_ns=frame.stamp_ns + sc.CLOCK_STEP_US * NS_PER_US)
     if isinstance(frame, TdoaBlink):
         return replace(frame, device_ticks=frame.device_ticks + sc.CLOCK_STEP_US)
     if isinstance(frame, ReportedCir):

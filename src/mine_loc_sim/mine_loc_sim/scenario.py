@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_core.people import Person
 from mine_loc_core.site import Site
 from mine_loc_core.stamps import NS_PER_S, to_ns
 from mine_loc_pdr.fdilink import AhrsFrame, ImuFrame
 from mine_loc_sim import scene_constants as sc
+from mine_loc_sim.bearing_emulator import BearingEmulator, Track, TrueBearing
 from mine_loc_sim.gait import draw_person
 from mine_loc_sim.imu_errors import draw_device
 from mine_loc_sim.magnetic_field import GalleryField
@@ -23,7 +25,7 @@ from mine_loc_sim.ranging_link import Radios
 from mine_loc_sim.reports import Report, Reporters
 from mine_loc_sim.route import plan_route
 from mine_loc_sim.route_network import RouteNetwork
-from mine_loc_sim.scene import SceneOptions, anchor_places_m, check_formats, line_names, line_of
+from mine_loc_sim.scene import SceneOptions, anchor_places_m, check_formats, line_names, line_of, monitor_line
 from mine_loc_sim.site_mine import mine_of, vehicle_prism
 from mine_loc_sim.tag_radio import HeardRound, RoundPlan, TagRadio, shortest_ways
 from mine_loc_sim.walker import TrueStep, TrueTurn, Walker
@@ -31,7 +33,7 @@ from mine_loc_sim.walker import TrueStep, TrueTurn, Walker
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 _CROWD_STEP_NS = NS_PER_S // 10
-Frame = Report | ImuFrame | AhrsFrame
+Frame = Report | ImuFrame | AhrsFrame | BearingReport
 Timed = tuple[int, Frame]
 
 
@@ -60,12 +62,16 @@ class TruePose:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A stretch of a scene: frames of each line with the instants of their measurements, in order, and link truth."""
+    """A stretch of a scene: frames of each line with the instants of their measurements, in order, and the truth.
+
+    A monitor's reports stand at the instants of their sending, and are of this block or an earlier one.
+    """
 
     start_ns: int
     stop_ns: int
     frames: Mapping[str, Collection[Timed]]
     links: Sequence[TrueLink]
+    bearings: Sequence[TrueBearing]
 
 
 class _Body:
@@ -91,15 +97,21 @@ class Scenario:
         check_formats(site)
         self.site, self.people, self.options = site, tuple(people), options
         self.lines = line_names(site, people)
-        seeds = np.random.SeedSequence(options.seed).spawn(3 + len(people))
+        seeds = np.random.SeedSequence(options.seed).spawn(4 + len(people))
         self._mine = _with_vehicles(site)
         self._anchors_m = anchor_places_m(site)
         self._field = GalleryField(np.random.default_rng(seeds[0]))
         self._radios = Radios.draw(len(self._anchors_m), np.random.default_rng(seeds[1]))
         self._reporters = Reporters(site, people, self._anchors_m, np.random.default_rng(seeds[2]), options)
         network = RouteNetwork(site, self._mine.obstacle_parts)
-        rngs = [np.random.default_rng(seed) for seed in seeds[3:]]
+        rngs = [np.random.default_rng(seed) for seed in seeds[3:-1]]
         self._bodies = {person.name: self._body(person, network, rng) for person, rng in zip(people, rngs, strict=True)}
+        self._bearings = self._monitors(np.random.default_rng(seeds[-1]))
+
+    def _monitors(self, rng: np.random.Generator) -> BearingEmulator:
+        """Everybody carries an emitter."""
+        tracks = {name: _track(body) for name, body in self._bodies.items()}
+        return BearingEmulator(self.site.monitors, tracks, self.options.monitor_errors, rng)
 
     def _body(self, person: Person, network: RouteNetwork, rng: np.random.Generator) -> _Body:
         ways, walking, device, imu, tag = rng.spawn(5)
@@ -148,7 +160,10 @@ class Scenario:
             links += _truth_of(person, heard, self.site)
             for line, frame in self._reporters.report(person, heard):
                 frames[line].append((heard.stamp_ns, frame))
-        return Block(start_ns, stop_ns, {**frames, **inertial}, links)
+        sent, bearings = self._bearings.play(stop_ns)
+        for monitor in self.site.monitors:
+            frames[monitor_line(monitor)] += sent[monitor.id]
+        return Block(start_ns, stop_ns, {**frames, **inertial}, links, bearings)
 
     def _rounds(self, start_ns: int, stop_ns: int) -> list[tuple[Person, HeardRound]]:
         """All rounds of the block, in order of time. Tags have their turns one after the other within a period."""
@@ -214,6 +229,10 @@ class _Crowd:
             return None
         columns = [np.interp(stamp_ns, self._stamp_ns, places[:, axis]) for places in others for axis in (0, 1)]
         return np.stack(columns, axis=1).reshape(len(stamp_ns), -1, 2)
+
+
+def _track(body: _Body) -> Track:
+    return lambda stamp_ns: body.pose(stamp_ns).position_m
 
 
 def _with_vehicles(site: Site) -> Mine:

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import N100, Person, Stride
-from mine_loc_core.site import Anchor, Site, UwbReceiver, Vehicle
+from mine_loc_core.site import Anchor, Monitor, Site, UwbReceiver, Vehicle
+from mine_loc_sim.bearing_emulator import MonitorErrors
 from mine_loc_sim.radio_constants import INDUSTRIAL, Environment
 from mine_loc_sim.route import WayPoint
 
@@ -36,6 +37,7 @@ class SceneOptions:
     cir: bool = False
     tdoa: bool = False
     environment: Environment = INDUSTRIAL
+    monitor_errors: MonitorErrors = field(default_factory=MonitorErrors)
     moved_anchors: tuple[MovedAnchor, ...] = ()
     routes: Mapping[str, Sequence[WayPoint]] = field(default_factory=dict)
 
@@ -53,9 +55,23 @@ def line_of(person: Person) -> str:
     return f"{person.name}/n100"
 
 
+def monitor_line(monitor: Monitor) -> str:
+    """Name of the line of a direction-finding monitor."""
+    return f"monitor_{monitor.id}"
+
+
 def line_names(site: Site, people: Sequence[Person]) -> tuple[str, ...]:
     """Names of all lines of a site and its people."""
-    return tuple(r.name for r in site.uwb_receivers) + tuple(line_of(p) for p in people if p.n100)
+    receivers = tuple(receiver.name for receiver in site.uwb_receivers)
+    inertial = tuple(line_of(person) for person in people if person.n100)
+    return receivers + inertial + tuple(monitor_line(monitor) for monitor in site.monitors)
+
+
+def line_formats(site: Site, people: Sequence[Person]) -> dict[str, str]:
+    """What is spoken on each line: the name of a UWB format, `fdilink` or `mldf`."""
+    spoken = {receiver.name: wire_format(receiver) for receiver in site.uwb_receivers}
+    spoken |= {line_of(person): "fdilink" for person in people if person.n100}
+    return spoken | {monitor_line(monitor): "mldf" for monitor in site.monitors}
 
 
 def anchor_places_m(site: Site) -> NDArray[np.float64]:

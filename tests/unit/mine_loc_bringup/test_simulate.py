@@ -1,4 +1,5 @@
 import dataclasses
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,14 @@ def test_playing_writes_a_site_that_points_to_its_lines_and_people(tmp_path: Pat
 def test_with_tcp_the_lines_are_ports_of_this_host(tmp_path: Path):
     assert main([*QUICK, "--tcp", "--seconds", "1", "--speed", "50", "--out", str(tmp_path)]) == 0
     assert load_site(tmp_path / "site").uwb_receivers[0].port.startswith("socket://127.0.0.1:")
+
+
+def test_a_site_with_monitors_has_a_line_of_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    field = ["simulate", "--site", str(CONFIG / "field_15km"), "--people", "3", "--seconds", "1", "--speed", "50"]
+    assert main([*field, "--tcp", "--out", str(tmp_path)]) == 0
+    told = capfd.readouterr().out
+    for monitor in range(1, 9):
+        assert re.search(rf"monitor_{monitor}\b.*\bmldf\b.*socket://127\.0\.0\.1:\d+", told)
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,23 @@
 import hashlib
+import math
 import os
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mine_loc_coarse import monitor_protocol
+from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_core.people import load_people
 from mine_loc_core.site import Site, UwbReceiver, load_site
+from mine_loc_core.stamps import NS_PER_S, NS_PER_US
 from mine_loc_pdr.fdilink import AhrsFrame, FdilinkDecoder, ImuFrame
 from mine_loc_sim.byte_streams import byte_blocks
 from mine_loc_sim.scenario import Scenario
-from mine_loc_sim.scene import SceneOptions, crew, wire_format
+from mine_loc_sim.scene import SceneOptions, crew, line_formats
 from mine_loc_uwb.ranging import CirWindow, RangingRound, TdoaBlink
 from mine_loc_uwb.wire.detect import make_decoder
 
@@ -31,9 +36,15 @@ class Heard:
     digest: str = ""
 
 
+def reader(spoken: str) -> Any:
+    """The driver's own decoder of a line."""
+    others: dict[str, Callable[[], object]] = {"fdilink": FdilinkDecoder, "mldf": monitor_protocol.decoder}
+    return others[spoken]() if spoken in others else make_decoder(spoken)
+
+
 def listen(scenario: Scenario, *, keep: bool = True) -> Heard:
-    formats = {receiver.name: wire_format(receiver) for receiver in scenario.site.uwb_receivers}
-    decoders = {line: make_decoder(formats[line]) if line in formats else FdilinkDecoder() for line in scenario.lines}
+    formats = line_formats(scenario.site, scenario.people)
+    decoders = {line: reader(formats[line]) for line in scenario.lines}
     heard, digest = Heard({line: [] for line in decoders}), hashlib.sha256()
     for block in byte_blocks(scenario):
         for line, arrivals in block.items():
@@ -120,3 +131,22 @@ def test_a_dwm1001_on_a_tag_prints_the_rounds_of_that_tag_alone():
     heard = listen(Scenario(site, people, SHORT))
     assert not +heard.losses["own"]
     assert 17 <= len(of_type(heard.messages["own"], RangingRound)) <= 20
+
+
+def test_monitors_lines_bring_every_report_that_is_not_lost_about_everybody_in_range():
+    options = SceneOptions(seed=2, seconds=20.0)
+    heard = listen(scenario(options, "field_15km", people=12))
+    assert all(not +losses for losses in heard.losses.values()), heard.losses
+    truth = [bearing for block in scenario(options, "field_15km", people=12).blocks() for bearing in block.bearings]
+    due = [bearing for bearing in truth if bearing.sent_ns is not None and bearing.sent_ns < 20 * NS_PER_S]
+    got = [report for monitor in range(1, 9) for report in heard.messages[f"monitor_{monitor}"]]
+    assert len({bearing.emitter for bearing in truth}) == 12
+    assert len(got) == len(due) > 50
+    measured_rad: dict[tuple[int, int], list[float]] = {}  # several of emitters on one channel
+    for each in due:
+        key = each.monitor_id, each.stamp_ns // NS_PER_US
+        measured_rad.setdefault(key, []).append(each.azimuth_rad + each.error_rad)
+    for report in got:
+        assert isinstance(report, BearingReport)
+        nearest = measured_rad[report.monitor_id, report.stamp_ns // NS_PER_US]
+        assert min(abs(math.remainder(report.azimuth_rad - each, math.tau)) for each in nearest) <= math.radians(0.0051)

@@ -1,21 +1,24 @@
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mine_loc_coarse import monitor_protocol
+from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_core.device_clock import DeviceClock
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import NS_PER_S, NS_PER_US
 from mine_loc_pdr.fdilink import FdilinkDecoder, ImuFrame
 from mine_loc_sim import imu_constants as ic
+from mine_loc_sim import scene_constants as sc
 from mine_loc_sim.byte_streams import byte_blocks
 from mine_loc_sim.faults import Fault, FaultKind, moved_anchors, parse_fault
 from mine_loc_sim.scenario import Scenario
-from mine_loc_sim.scene import SceneOptions
+from mine_loc_sim.scene import SceneOptions, line_names
 from mine_loc_sim.timed_bytes import Arrival, Cable
 from mine_loc_uwb.device_stamps import DeviceStamps
 from mine_loc_uwb.ranging import RangingRound
@@ -192,3 +195,25 @@ def test_a_wrong_fault_is_refused_saying_what_is_allowed(text: str, allowed: str
     with pytest.raises(ConfigurationError, match=allowed.replace("+", r"\+")) as refusal:
         parse_fault(text, LINES, ANCHORS)
     assert text in str(refusal.value)
+
+
+def test_a_step_of_a_monitors_clock_changes_its_stamps_and_nothing_else():
+    folder = FOLDER.with_name("field_15km")
+    site, people = load_site(folder), tuple(load_people(folder))
+    options = SceneOptions(seed=5, seconds=30.0)
+
+    def heard(*faults: Fault) -> list[BearingReport]:
+        decoders = {line: monitor_protocol.decoder() for line in line_names(site, ())}
+        return [
+            report
+            for block in byte_blocks(Scenario(site, people, options), faults)
+            for line, decoder in decoders.items()
+            for _, data in block[line]
+            if isinstance(data, bytes)
+            for report in decoder.feed(data)
+        ]
+
+    healthy, stepped = heard(), heard(parse_fault("clock_step@0+30", line_names(site, people), []))
+    assert len(healthy) > 10
+    late_ns = sc.CLOCK_STEP_US * NS_PER_US
+    assert stepped == [replace(report, stamp_ns=report.stamp_ns + late_ns) for report in healthy]

@@ -16,6 +16,7 @@ from mine_loc_sim.scene import MovedAnchor, SceneOptions, anchor_places_m, crew
 
 CONFIG = Path(__file__).parents[3] / "config"
 SHORT = SceneOptions(seed=3, seconds=2.0, cir=True)
+MINE_MONITORS = ("monitor_1", "monitor_2", "monitor_3")
 
 
 def scenario(site: str = "example_mine", people: int = 2, options: SceneOptions = SHORT) -> Scenario:
@@ -40,7 +41,7 @@ def blocks() -> list[Block]:
 
 def test_every_line_has_frames_in_order_of_time_and_inside_their_block(blocks: list[Block]):
     for block in blocks:
-        assert set(block.frames) == {"portal", "junction", "fitter/n100", "driver/n100"}
+        assert set(block.frames) == {"portal", "junction", "fitter/n100", "driver/n100", *MINE_MONITORS}
         for frames in block.frames.values():
             stamps = [stamp_ns for stamp_ns, _ in frames]
             assert stamps == sorted(stamps)
@@ -135,10 +136,22 @@ def test_a_moved_anchor_changes_true_distances_only_while_it_is_moved():
     assert distances(still, 1) != distances(moved, 1)
 
 
-def test_a_site_without_anchors_still_has_inertial_sensors():
+def test_a_site_without_anchors_still_has_inertial_sensors_and_monitors():
     frames = next(scenario("field_15km").blocks()).frames
-    assert set(frames) == {"scout/n100", "medic/n100"}
-    assert all(len(each) > 100 for each in frames.values())
+    assert set(frames) == {"scout/n100", "medic/n100", *(f"monitor_{number}" for number in range(1, 9))}
+    assert all(len(frames[line]) > 100 for line in ("scout/n100", "medic/n100"))
+
+
+def test_monitors_measure_where_people_are_at_the_stamp():
+    played = scenario("field_15km", 3, SceneOptions(seed=3, seconds=30.0))
+    bearings = [bearing for block in played.blocks() for bearing in block.bearings]
+    places = {monitor.id: monitor.position_m for monitor in played.site.monitors}
+    assert {bearing.emitter for bearing in bearings} == {"scout", "medic", "walker_1"}
+    for bearing in bearings:
+        x_m, y_m, _ = played.pose(bearing.emitter, np.array([bearing.stamp_ns])).position_m[0]
+        east_m, north_m = x_m - places[bearing.monitor_id][0], y_m - places[bearing.monitor_id][1]
+        assert bearing.azimuth_rad == pytest.approx(np.arctan2(north_m, east_m), abs=1e-9)
+        assert bearing.distance_m == pytest.approx(np.hypot(east_m, north_m))
 
 
 def test_more_people_than_a_site_has_are_made_up_with_tags_of_their_own():

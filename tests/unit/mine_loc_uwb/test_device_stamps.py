@@ -5,13 +5,13 @@ import pytest
 from mine_loc_core.device_clock import SyncState
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_uwb.device_stamps import DeviceStamps
-from mine_loc_uwb.wire.decoder import LineDecoder
+from mine_loc_uwb.wire.decoder import TextDecoder
 
 T0 = 1_760_000_000 * NS_PER_S
 
 
 def decoder(**options):
-    return LineDecoder("x", lambda _: None, **({"tick_period_s": 1e-3, "counter_bits": 32, "seq_bits": 8} | options))
+    return TextDecoder("x", lambda _: None, **({"tick_period_s": 1e-3, "counter_bits": 32, "seq_bits": 8} | options))
 
 
 def stamps(*, trust=True, latency_ns=0):

@@ -200,7 +200,9 @@ class _Demo:
                 reports.append(person_report(truth.person, self._track(truth.person), truth, self._ends_s))
             except ValueError as error:
                 missing.append(str(error))
-        played = sum(p.played for p, name in zip(self._players, self._recording.lines, strict=True) if "/" not in name)
+        receivers = {receiver.name for receiver in site.uwb_receivers}
+        lines = zip(self._players, self._recording.lines, strict=True)
+        played = sum(player.played for player, name in lines if name in receivers)
         died = [(at_s, e) for at_s, e in self._events if e.kind in {EventKind.DIED, EventKind.FAILED}]
         report = {
             "source": self._recording.source,

@@ -3,17 +3,20 @@
 Opens a pseudo-terminal a device under build/sim/ports (or a TCP port of this host with --tcp), writes a site folder
 with these lines to build/sim/site, and plays until Ctrl-C or the end; run the graph beside it with the command line it
 prints. The UWB receivers speak their format of site.yaml: mine_loc (for auto too), trek1000 or dwm1001_shell; N100s
-speak FDILink. Same seed, same bytes. With --bag nothing is played: what the drivers would publish of the bytes is
-written at once, together with the truth (truth/<person>/pose, truth/steps, truth/link_state).
+speak FDILink; direction-finding monitors report emitters, of which everybody carries one ($MLDF). Same seed, same
+bytes. With --bag nothing is played: what the drivers would publish of the bytes is written at once, together with the
+truth (truth/<person>/pose, truth/steps, truth/link_state). Monitors have no driver yet, so a bag has nothing of them.
 
 Faults are written KIND@START+DURATION[:DEVICE], with seconds since the beginning:
-  noise, truncation, stall, unplug, clock_step     of a line: a receiver's name or person/n100; without one of all
+  noise, truncation, stall, unplug, clock_step     of a line: a receiver's name, person/n100 or monitor_<id>;
+                                                   without one of all
   imu_saturation                                   of a person/n100
   frozen_anchor, moved_anchor                      of an anchor's id
 
 Examples:
   mine-loc simulate --site config/example_mine --people 3
   mine-loc simulate --site config/example_mine --people 3 --fault stall@20+0.4:portal --fault unplug@30+5:fitter/n100
+  mine-loc simulate --site config/field_15km --people 20 --tcp
   mine-loc simulate --site config/gallery_2km --people 10 --cir --seconds 60 --bag build/gallery
 """
 
@@ -35,7 +38,7 @@ from mine_loc_core.stamps import NS_PER_S
 from mine_loc_sim.byte_streams import byte_blocks
 from mine_loc_sim.faults import Fault, moved_anchors, parse_fault
 from mine_loc_sim.scenario import Scenario
-from mine_loc_sim.scene import SceneOptions, crew, line_names, wire_format
+from mine_loc_sim.scene import SceneOptions, crew, line_formats, line_names
 from mine_loc_sim.serial_lines import Ahead, Line, Player, PseudoSerial, TcpBridge
 
 _FIRST_BLOCK_S = 120.0
@@ -113,7 +116,7 @@ def _play(scenario: Scenario, faults: list[Fault], arguments: argparse.Namespace
     addresses = {name: line.address for name, line in lines.items()}
     write_site_folder(arguments.site, out / "site", addresses, scenario.people)
     ahead = Ahead(byte_blocks(scenario, faults), lines)
-    _print_ports(scenario.site, addresses, out / "site")
+    _print_ports(scenario, addresses, out / "site")
     if not ahead.wait_ready(_FIRST_BLOCK_S):
         raise MineLocError(f"the first block of the scene took longer than {_FIRST_BLOCK_S:g} s")
     players = [Player(line, ahead.arrivals(name), arguments.speed) for name, line in lines.items()]
@@ -129,10 +132,10 @@ def _play(scenario: Scenario, faults: list[Fault], arguments: argparse.Namespace
     return 0
 
 
-def _print_ports(site: Site, addresses: dict[str, str], folder: Path) -> None:
-    formats = {receiver.name: wire_format(receiver) for receiver in site.uwb_receivers}
+def _print_ports(scenario: Scenario, addresses: dict[str, str], folder: Path) -> None:
+    formats = line_formats(scenario.site, scenario.people)
     table = Table("line", "speaks", "port")
     for name, address in addresses.items():
-        table.add_row(name, formats.get(name, "fdilink"), address)
+        table.add_row(name, formats[name], address)
     Console().print(table)
     print(f"run the graph on these lines:\n  mine-loc up --site {folder}", flush=True)

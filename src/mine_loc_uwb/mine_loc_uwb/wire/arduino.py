@@ -16,7 +16,7 @@ from math import isnan, nan
 from mine_loc_core.framing import Damaged
 from mine_loc_core.line_splitter import LINE_END
 from mine_loc_uwb.ranging import Message, Range, RangingRound
-from mine_loc_uwb.wire.decoder import LineDecoder
+from mine_loc_uwb.wire.decoder import TextDecoder
 
 _BOUNDARY = LINE_END + rb"|(?=from: )|(?=\{\"links\")|(?<=\]\})"
 _NUMBER = r"-?\d{1,6}\.\d+"
@@ -30,9 +30,9 @@ _LINK_RANGE = re.compile(r"-?\d{1,6}(?:\.\d+)?")
 _EVENT = re.compile(r"blink;.*|ranging init;.*|delete inactive device:.*")
 
 
-def decoder() -> LineDecoder:
+def decoder() -> TextDecoder:
     """Decoder of all four formats; none carries a clock of known unit."""
-    return LineDecoder("arduino", decode_line, boundary=_BOUNDARY)
+    return TextDecoder("arduino", decode_line, boundary=_BOUNDARY)
 
 
 def decode_line(line: str) -> Message | Damaged | None:

@@ -1,11 +1,10 @@
 """What all decoders share: the interface a driver sees, and the decoder of a format that consists of lines."""
 
 from collections import Counter
-from collections.abc import Callable
 from typing import Protocol
 
-from mine_loc_core.framing import Damaged
-from mine_loc_core.line_splitter import LINE_END, LineSplitter
+from mine_loc_core.line_decoder import DecodeLine, LineDecoder
+from mine_loc_core.line_splitter import LINE_END
 from mine_loc_uwb.ranging import Message
 
 
@@ -39,42 +38,21 @@ class Decoder(Protocol):
         """Forget a partial message, after the link was reopened."""
 
 
-DecodeLine = Callable[[str], Message | Damaged | None]
-"""Decodes one line: None = known and of no interest, Damaged = lost."""
-
-
-class LineDecoder:
+class TextDecoder(LineDecoder[Message]):
     """Decoder of a text format; `boundary` as in LineSplitter."""
 
     def __init__(
         self,
         name: str,
-        decode_line: DecodeLine,
+        decode_line: DecodeLine[Message],
         *,
         boundary: bytes = LINE_END,
         tick_period_s: float = 0.0,
         counter_bits: int = 0,
         seq_bits: int = 0,
     ) -> None:
+        super().__init__(decode_line, boundary)
         self.name = name
         self.tick_period_s = tick_period_s
         self.counter_bits = counter_bits
         self.seq_bits = seq_bits
-        self._decode_line = decode_line
-        self._splitter = LineSplitter(boundary)
-        self.losses = self._splitter.losses
-
-    def feed(self, data: bytes) -> list[Message]:
-        """Take the next bytes of the stream and return the messages they complete, in order."""
-        messages = []
-        for line in self._splitter.feed(data):
-            result = self._decode_line(line)
-            if isinstance(result, Damaged):
-                self.losses[result.kind] += 1
-            elif result is not None:
-                messages.append(result)
-        return messages
-
-    def reset(self) -> None:
-        """Forget a partial line, after the link was reopened."""
-        self._splitter.reset()

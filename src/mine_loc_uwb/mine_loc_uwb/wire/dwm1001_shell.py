@@ -16,7 +16,7 @@ from math import isnan
 from mine_loc_core.framing import Damaged
 from mine_loc_core.line_splitter import LINE_END
 from mine_loc_uwb.ranging import DevicePosition, Message, Range, RangingRound
-from mine_loc_uwb.wire.decoder import LineDecoder
+from mine_loc_uwb.wire.decoder import TextDecoder
 
 PROMPT = b"dwm> "
 Point = tuple[float, float, float]
@@ -34,9 +34,9 @@ _LISTENED_POSITION = re.compile(rf"POS,\d+,([0-9A-Fa-f]{{4}}),{_POINT},{_QUALITY
 _CHATTER = re.compile(r"(?:dwm> ?)?(?:lec|les|lep)?|DWM1001.*|Copyright.*|License.*|Compiled.*|Help *:.*")
 
 
-def decoder() -> LineDecoder:
+def decoder() -> TextDecoder:
     """Decoder of the shell's streams; they carry neither a clock nor a counter."""
-    return LineDecoder("dwm1001_shell", decode_line, boundary=_BOUNDARY)
+    return TextDecoder("dwm1001_shell", decode_line, boundary=_BOUNDARY)
 
 
 def decode_line(line: str) -> Message | Damaged | None:

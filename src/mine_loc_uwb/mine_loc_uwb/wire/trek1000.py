@@ -14,7 +14,7 @@ from math import isnan
 from mine_loc_core.framing import Damaged
 from mine_loc_core.line_splitter import LINE_END
 from mine_loc_uwb.ranging import AnchorRange, AnchorRanging, Message, Range, RangingRound
-from mine_loc_uwb.wire.decoder import LineDecoder
+from mine_loc_uwb.wire.decoder import TextDecoder
 
 _BOUNDARY = LINE_END + rb"|(?=[mM][rRcCaAeE] )"
 _LINE = re.compile(r"m([rca])((?: +[0-9a-f]{1,8})+) +([at])(\d{1,4}):(\d{1,4})(?: +[0-9a-f]+)?", re.IGNORECASE)
@@ -24,9 +24,9 @@ _RANGES_OF_FIELDS = {1 + n + 3 + extra: n for n in (_PLAIN, _CLONE_8) for extra 
 """Ranges in a line of so many hex fields: MASK, the ranges, NRANGES, RSEQ, EXTRA and the extra field of some clones."""
 
 
-def decoder() -> LineDecoder:
+def decoder() -> TextDecoder:
     """Decoder of `mr`, `mc` and `ma` lines; the clock is the millisecond counter of `mc`."""
-    return LineDecoder("trek1000", decode_line, boundary=_BOUNDARY, tick_period_s=1e-3, counter_bits=32, seq_bits=8)
+    return TextDecoder("trek1000", decode_line, boundary=_BOUNDARY, tick_period_s=1e-3, counter_bits=32, seq_bits=8)
 
 
 def decode_line(line: str) -> Message | Damaged | None:

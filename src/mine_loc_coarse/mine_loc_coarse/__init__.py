@@ -1,0 +1,1 @@
+"""Coarse regions from direction-finding monitors."""
