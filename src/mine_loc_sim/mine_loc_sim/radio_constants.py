@@ -76,8 +76,7 @@ REPORTED_LEVEL_CEILING_DBM = -78.3
 ACCUMULATOR_LIMIT = 16384.0
 """Accumulation stops as soon as a component reaches it: peaks pile up there, RXPACC falls with level (cirs)."""
 PREAMBLE_COUNT_1024 = 998
-PREAMBLE_COUNT_128 = 101
-"""Symbols accumulated of a preamble of 1024 (cirs) and 128 (University part of D.1) when nothing saturates."""
+"""Symbols accumulated of a preamble of 1024 when nothing saturates (cirs)."""
 SFD_SYMBOLS = 64
 """Symbols counted besides by RXPACC of an unsaturated reception: standard SFD at 110 kbit/s (UM 7.2.18)."""
 NOISE_PER_SYMBOL_COUNTS = 7.7
@@ -167,8 +166,6 @@ BODY_RADIUS_M = 0.25
 """Another person as a cylinder, with the loss above when crossed in the middle: assumed."""
 FURTHER_CORNER_LOSS_DB = 20.0
 """Each corner beyond the first, which CM8's own loss stands for: assumed."""
-OPAQUE_DB = 80.0
-"""Beyond this a through path cannot be received with any link budget here: transmit power to sensitivity."""
 
 
 @dataclass(frozen=True, slots=True)
