@@ -10,6 +10,7 @@ mkdir -p build
 import json, sys
 print("# Made from requirements.in by `make lock`: do not edit by hand.")
 packages = [item["metadata"] for item in json.load(open(sys.argv[1]))["install"]]
-print(*sorted(f"{package['name']}=={package['version']}" for package in packages), sep="\n")
+# Without the local part of a version ("+cpu"), which an index of its own adds.
+print(*sorted(f"{package['name']}=={package['version'].split('+')[0]}" for package in packages), sep="\n")
 PYTHON
 mv build/requirements.txt requirements.txt
