@@ -66,6 +66,13 @@ wanted_workspace() {
       find src -name '*.py' -o -name '*.yaml' | sort; } | sha256sum
 }
 
+# The solvers' compiled code is cached beside their sources; without this the first node to start would wait for it.
+compile_solvers() (
+    # shellcheck disable=SC1091
+    . ./env.sh
+    python -c 'from mine_loc_uwb import parameters, round_solver; round_solver.rehearse(parameters.UwbSolverParameters(), 2)'
+)
+
 build_workspace() {
     local wanted=$1
     rm -f ros_ws/install/made-from
@@ -76,6 +83,7 @@ build_workspace() {
         export AMENT_PREFIX_PATH=$VIRTUAL_ENV CMAKE_PREFIX_PATH=$VIRTUAL_ENV LD_LIBRARY_PATH=$VIRTUAL_ENV/lib MAKEFLAGS=-j$(nproc)
         COLCON_DEFAULTS_FILE=colcon.yaml colcon build
     )
+    compile_solvers
     echo "$wanted" > ros_ws/install/made-from
 }
 

@@ -4,10 +4,15 @@ The circle of the last anchor is subtracted from the others, which leaves equati
 2 (x_i − x_n) x + 2 (y_i − y_n) y = r_n² − r_i² with r_j² = d_j² − x_j² − y_j².
 """
 
+import math
+
 import numpy as np
 
 from mine_loc_core.gates import chi2_quantile
+from mine_loc_core.verdicts import Reason
 from mine_loc_uwb.fix import Array, Fix, FixStatus, no_fix
+from mine_loc_uwb.measurements import Measurements
+from mine_loc_uwb.solver import Solution
 
 _RANK_TOLERANCE = 1e-6
 _CONTRADICTION = 0.999  # residuals beyond this quantile say that the ranges are worse than they claim
@@ -48,6 +53,25 @@ def solve(
     if height_m is not None:
         position[2] = height_m
     return _judge(anchors_m, ranges_m, position, gain @ gain.T * variance, max_gdop)
+
+
+class LeastSquares:
+    """Each round by itself; see `Solver`."""
+
+    def __init__(self, max_gdop: float = 10.0) -> None:
+        self._max_gdop = max_gdop
+
+    def solve(self, measurements: Measurements) -> Solution:
+        """See `Solver`."""
+        fix = solve(
+            measurements.anchors_m,
+            measurements.range_m,
+            range_sd_m=math.sqrt(np.mean(measurements.variance_m2)) if len(measurements) else math.nan,
+            height_m=measurements.height_m,
+            max_gdop=self._max_gdop,
+        )
+        reason = Reason.ACCEPTED if fix.status is FixStatus.OK else Reason.DEGENERATE
+        return Solution(fix, (reason,) * len(measurements), np.full(len(measurements), math.nan), math.nan)
 
 
 def _range_variance(residuals: Array, residual_gain: Array, redundancy: int, range_sd_m: float) -> float:

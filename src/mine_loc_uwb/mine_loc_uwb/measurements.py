@@ -1,5 +1,6 @@
 """What a position solver is given: all that one tag measured at one instant."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,3 +37,13 @@ class Measurements:
 
     def __len__(self) -> int:
         return len(self.range_m)
+
+    @property
+    def dimensions(self) -> int:
+        """How many coordinates are to be solved."""
+        return 3 if self.height_m is None else 2
+
+    @property
+    def plane_m(self) -> float:
+        """`height_m` as compiled code takes it: NaN = solve in space."""
+        return math.nan if self.height_m is None else self.height_m

@@ -5,6 +5,10 @@ from dataclasses import dataclass
 from mine_loc_core.parameters import NodeParameters, parameter
 from mine_loc_uwb.wire.detect import FORMATS
 
+RANGE_METHODS = ("robust_tracker", "least_squares", "weighted_lm")
+TDOA_METHODS = ("robust_tracker",)
+"""Keys of the tables in `solvers`, which is slow to import."""
+
 
 @dataclass(frozen=True)
 class Dwm1000DriverParameters(NodeParameters):
@@ -24,6 +28,24 @@ class Dwm1000DriverParameters(NodeParameters):
 class UwbSolverParameters(NodeParameters):
     """Positions from ranging rounds."""
 
-    method: str = parameter("least_squares", "solver", choices=("least_squares",))
+    method: str = parameter("robust_tracker", "solver of ranging rounds", choices=RANGE_METHODS)
+    tdoa_method: str = parameter("robust_tracker", "solver of blinks", choices=TDOA_METHODS)
+    frame: str = parameter(
+        "",
+        "whose anchors: map, or the id of a vehicle that carries them; empty = the map's if it has any",
+        read_only=True,
+    )
     max_range_m: float = parameter(300.0, "longer ranges are impossible", unit="m", low=1.0, high=1000.0)
+    arrival_sd_m: float = parameter(0.15, "standard deviation of a blink's arrivals", unit="m", low=0.001, high=10.0)
     max_gdop: float = parameter(10.0, "geometry beyond it is degenerate", unit="1", low=1.0, high=1000.0)
+    acceleration_density: float = parameter(
+        0.1, "spectral density of a person's acceleration", unit="m^2/s^3", low=1e-4, high=100.0
+    )
+    top_speed: float = parameter(3.0, "nobody moves faster against the anchors", unit="m/s", low=0.5, high=50.0)
+    nlos_share: float = parameter(0.5, "share of links that are obstructed here", unit="1", low=0.01, high=0.95)
+    gate: float = parameter(
+        0.9999, "probability that a range as it should be passes", unit="1", low=0.9, high=0.9999999
+    )
+    reopen_after_s: float = parameter(
+        2.0, "most ranges refused for so long: begin anew where they agree", unit="s", low=0.2, high=60.0
+    )

@@ -112,6 +112,15 @@ def los_probability_from_powers(first_path_dbm: float, receive_dbm: float) -> fl
     return gap_db if isnan(gap_db) else min(max((10.0 - gap_db) / 4.0, 0.0), 1.0)
 
 
+def odds_of_power_rule(rule: float) -> float:
+    """What the answer of `los_probability_from_powers` is worth as a probability at even odds; NaN stays NaN.
+
+    On three public data sets the gap is below 6 dB on some 80 % of LOS links and 33 % of the others, above 10 dB on 3 %
+    and 40 % (hardware notes D.2): 0.71, 0.39 and 0.07, a straight line in the rule's 1, 0.5 and 0.
+    """
+    return 0.07 + 0.64 * rule
+
+
 def reception_with_powers(first_path_dbm: float, receive_dbm: float, symbols: int, prf_mhz: int) -> Reception:
     """Registers that a device would report at these powers, for simulators: F1 = F2 = F3, to the rounding of registers.
 

@@ -1,88 +1,214 @@
-"""From the ranges of a round to a position and a verdict on each range: checks, anchor map, solver."""
+"""From what a tag measured to a position and a verdict on each measurement: checks, anchor map, solver of that tag."""
 
 import math
+from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mine_loc_core.site import Anchor
+from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_uwb import least_squares
-from mine_loc_uwb.fix import Fix, FixStatus
+from mine_loc_uwb.fix import Fix, FixStatus, no_fix
+from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.parameters import UwbSolverParameters
+from mine_loc_uwb.range_checks import RepeatedValues, impossible, stamp_reason
+from mine_loc_uwb.received_power import odds_of_power_rule
+from mine_loc_uwb.solver import Solution, Solver
+from mine_loc_uwb.solvers import RANGE_SOLVERS, TDOA_SOLVERS
 
-_FROZEN_ROUNDS = 20
-"""A radio's ranges scatter by 2 cm (hardware.md D.1); the same millimetre this often is a stuck value."""
+_MOST_TAGS = 4096
+_DEFAULT_VARIANCE_M2 = 0.1**2
+_LINK_STATE_HOLDS_NS = NS_PER_S
+"""A walker passes what obstructs a link in about this time."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRange:
-    """One range as the driver published it, corrected for what the driver knows."""
+    """One range, or one arrival of a blink as a way, as the driver published it."""
 
     anchor_id: int
     range_m: float
     variance_m2: float
+    since_ns: int = 0
+    """Instant of the exchange minus the stamp of the round."""
+    los_probability: float = math.nan
+    receive_power_dbm: float = math.nan
+
+
+@dataclass(slots=True)
+class _Tag:
+    """What is kept for one tag and one kind of measurement."""
+
+    solver: Solver
+    repeated: RepeatedValues = field(default_factory=RepeatedValues)
+    last_ns: int | None = None
 
 
 class RoundSolver:
-    """Solves rounds of any number of tags against one anchor map."""
+    """Solves rounds and blinks of any number of tags against one anchor map."""
 
     def __init__(self, anchors: Iterable[Anchor], parameters: UwbSolverParameters) -> None:
         self.anchors: Mapping[int, Anchor] = {anchor.id: anchor for anchor in anchors}
         self.disabled: set[int] = set()
-        self.parameters = parameters
-        self._repeats: dict[tuple[int, int], tuple[float, int]] = {}
+        self._parameters = parameters
+        self._tags: OrderedDict[tuple[int, Source], _Tag] = OrderedDict()
+        self._link_states: dict[int, dict[int, tuple[float, int]]] = {}
+
+    @property
+    def parameters(self) -> UwbSolverParameters:
+        """Methods and limits in force; new ones begin with new solvers."""
+        return self._parameters
+
+    @parameters.setter
+    def parameters(self, parameters: UwbSolverParameters) -> None:
+        self._parameters = parameters
+        self.reset()
 
     def solve(
-        self, tag_id: int, ranges: Sequence[MeasuredRange], height_m: float | None
+        self, tag_id: int, stamp_ns: int, now_ns: int, ranges: Sequence[MeasuredRange], height_m: float | None
     ) -> tuple[Fix, tuple[Verdict, ...]]:
-        """Position of one tag (see `least_squares.solve`) and one verdict a range, in their order."""
-        reasons: list[Reason] = []
-        seen: set[int] = set()
-        for item in ranges:
-            reasons.append(Reason.DUPLICATE if item.anchor_id in seen else self._check(tag_id, item))
-            if reasons[-1] is Reason.ACCEPTED:
-                seen.add(item.anchor_id)
-        used = [item for item, reason in zip(ranges, reasons, strict=True) if reason is Reason.ACCEPTED]
-        anchors = [self.anchors[item.anchor_id] for item in used]
-        variances = [item.variance_m2 for item in used if 0.0 < item.variance_m2 < math.inf]
-        fix = least_squares.solve(
-            np.array([anchor.position_m for anchor in anchors]).reshape(-1, 3),
-            np.array([item.range_m - anchor.range_offset_m for item, anchor in zip(used, anchors, strict=True)]),
-            range_sd_m=math.sqrt(np.mean(variances)) if variances else 0.1,
-            height_m=height_m,
-            max_gdop=self.parameters.max_gdop,
-        )
-        if fix.status is not FixStatus.OK:
-            reasons = [Reason.DEGENERATE if reason is Reason.ACCEPTED else reason for reason in reasons]
-        verdicts = tuple(
-            Verdict(Source.RANGE, item.anchor_id, reason, innovation=self._residual(item, fix))
-            for item, reason in zip(ranges, reasons, strict=True)
-        )
-        return fix, verdicts
+        """Position of one tag from a ranging round, and one verdict a range, in their order."""
+        return self._solve(tag_id, stamp_ns, now_ns, ranges, height_m, Source.RANGE)
+
+    def solve_blink(
+        self, tag_id: int, stamp_ns: int, now_ns: int, arrivals: Sequence[MeasuredRange], height_m: float | None
+    ) -> tuple[Fix, tuple[Verdict, ...]]:
+        """Position of one tag from the arrivals of a blink, the reference anchor's being 0 (see `Measurements`)."""
+        return self._solve(tag_id, stamp_ns, now_ns, arrivals, height_m, Source.TDOA)
+
+    def link_state(self, tag_id: int, anchor_id: int, stamp_ns: int, los_probability: float) -> None:
+        """A judgement of the classifier; counts before the powers' for the link's measurements of the next second."""
+        if anchor_id in self.anchors and len(self._link_states) < _MOST_TAGS:
+            self._link_states.setdefault(tag_id, {})[anchor_id] = los_probability, stamp_ns
+
+    def reset(self) -> None:
+        """Forget what rests on earlier stamps."""
+        self._tags.clear()
+        self._link_states.clear()
 
     def forget(self, tag_id: int) -> None:
         """Release what is kept for a tag that went silent."""
-        for key in [key for key in self._repeats if key[0] == tag_id]:
-            del self._repeats[key]
+        self._link_states.pop(tag_id, None)
+        for source in (Source.RANGE, Source.TDOA):
+            self._tags.pop((tag_id, source), None)
 
-    def _check(self, tag_id: int, item: MeasuredRange) -> Reason:
+    def _solve(
+        self,
+        tag_id: int,
+        stamp_ns: int,
+        now_ns: int,
+        items: Sequence[MeasuredRange],
+        height_m: float | None,
+        source: Source,
+    ) -> tuple[Fix, tuple[Verdict, ...]]:
+        tag = self._tag(tag_id, source)
+        timely = stamp_reason(stamp_ns, tag.last_ns, now_ns)
+        if timely is not Reason.ACCEPTED:
+            fix = no_fix(FixStatus.TOO_FEW_RANGES, 3 if height_m is None else 2, 0)
+            return fix, tuple(Verdict(source, item.anchor_id, timely) for item in items)
+        tag.last_ns = stamp_ns
+        reasons = self._checked(tag, items, source)
+        used = [number for number, reason in enumerate(reasons) if reason is Reason.ACCEPTED]
+        measurements = self._measurements(tag_id, stamp_ns, [items[number] for number in used], height_m, source)
+        solution = tag.solver.solve(measurements)
+        verdicts = {
+            number: Verdict(source, items[number].anchor_id, *judged)
+            for number, judged in zip(used, _judgements(solution, measurements), strict=True)
+        }
+        return solution.fix, tuple(
+            verdicts.get(number) or Verdict(source, item.anchor_id, reasons[number])
+            for number, item in enumerate(items)
+        )
+
+    def _tag(self, tag_id: int, source: Source) -> _Tag:
+        """The tag heard longest ago makes room when there are too many."""
+        key = tag_id, source
+        if key not in self._tags:
+            if len(self._tags) >= _MOST_TAGS:
+                self._tags.popitem(last=False)
+            parameters = self._parameters
+            make = RANGE_SOLVERS[parameters.method] if source is Source.RANGE else TDOA_SOLVERS[parameters.tdoa_method]
+            self._tags[key] = _Tag(make(parameters))
+        self._tags.move_to_end(key)
+        return self._tags[key]
+
+    def _checked(self, tag: _Tag, items: Sequence[MeasuredRange], source: Source) -> list[Reason]:
+        """What is refused before the solver; a failed range does not make the next one of its anchor a duplicate."""
+        reasons: list[Reason] = []
+        seen: set[int] = set()
+        for item in items:
+            reason = Reason.DUPLICATE if item.anchor_id in seen else self._check(tag, item, source)
+            if reason is Reason.ACCEPTED:
+                seen.add(item.anchor_id)
+            reasons.append(reason)
+        return reasons
+
+    def _check(self, tag: _Tag, item: MeasuredRange, source: Source) -> Reason:
         anchor = self.anchors.get(item.anchor_id)
         if anchor is None:
             return Reason.UNKNOWN_SENSOR
         if item.anchor_id in self.disabled:
             return Reason.DISABLED
-        corrected_m = item.range_m - anchor.range_offset_m
-        if not math.isfinite(corrected_m) or corrected_m <= 0.0 or corrected_m > self.parameters.max_range_m:
+        difference = source is Source.TDOA
+        value_m = item.range_m if difference else item.range_m - anchor.range_offset_m
+        if impossible(value_m, self._parameters.max_range_m, difference=difference):
             return Reason.INVALID
-        last_m, repeats = self._repeats.get((tag_id, item.anchor_id), (math.nan, 0))
-        repeats = repeats + 1 if item.range_m == last_m else 0
-        self._repeats[tag_id, item.anchor_id] = item.range_m, repeats
-        return Reason.FROZEN if repeats >= _FROZEN_ROUNDS else Reason.ACCEPTED
+        reference = difference and item.range_m == 0.0
+        if not reference and tag.repeated.frozen(item.anchor_id, item.range_m):
+            return Reason.FROZEN
+        return Reason.ACCEPTED
 
-    def _residual(self, item: MeasuredRange, fix: Fix) -> float:
-        anchor = self.anchors.get(item.anchor_id)
-        if anchor is None:
-            return math.nan
-        return item.range_m - anchor.range_offset_m - math.dist(anchor.position_m, fix.position_m)
+    def _measurements(
+        self, tag_id: int, stamp_ns: int, items: Sequence[MeasuredRange], height_m: float | None, source: Source
+    ) -> Measurements:
+        anchors = [self.anchors[item.anchor_id] for item in items]
+        offsets = [0.0 if source is Source.TDOA else anchor.range_offset_m for anchor in anchors]
+        return Measurements(
+            stamp_ns=stamp_ns,
+            anchor_ids=np.array([item.anchor_id for item in items], np.uint64),
+            anchors_m=np.array([anchor.position_m for anchor in anchors]).reshape(-1, 3),
+            range_m=np.array([item.range_m - offset for item, offset in zip(items, offsets, strict=True)], float),
+            variance_m2=np.array([_variance(item, anchor) for item, anchor in zip(items, anchors, strict=True)], float),
+            since_s=np.array([item.since_ns / NS_PER_S for item in items], float),
+            los_probability=np.array([self._los_probability(tag_id, stamp_ns, item) for item in items], float),
+            receive_power_dbm=np.array([item.receive_power_dbm for item in items], float),
+            height_m=height_m,
+            shared_offset=source is Source.TDOA,
+        )
+
+    def _los_probability(self, tag_id: int, stamp_ns: int, item: MeasuredRange) -> float:
+        told, told_ns = self._link_states.get(tag_id, {}).get(item.anchor_id, (math.nan, 0))
+        if not math.isnan(told) and abs(stamp_ns - told_ns) <= _LINK_STATE_HOLDS_NS:
+            return told
+        return odds_of_power_rule(item.los_probability)
+
+
+def rehearse(parameters: UwbSolverParameters, dimensions: int) -> None:
+    """Solve two made-up rounds, so that what is compiled is there before the first real one comes."""
+    corners = [(0.0, 0.0, 2.0), (9.0, 0.0, 3.0), (9.0, 9.0, 2.0), (0.0, 9.0, 3.0), (4.0, 4.0, 9.0)]
+    solver = RoundSolver([Anchor(i + 1, "", corner, 0.0, 0.0) for i, corner in enumerate(corners)], parameters)
+    for stamp_ns in (1, NS_PER_S):
+        ranges = [MeasuredRange(i + 1, math.dist(corner, (3.0, 5.0, 1.0)), 0.01) for i, corner in enumerate(corners)]
+        solver.solve(1, stamp_ns, stamp_ns, ranges, None if dimensions == 3 else 1.0)
+
+
+def _variance(item: MeasuredRange, anchor: Anchor) -> float:
+    """Of the range and of where the anchor hangs; what no radio can claim counts as unknown."""
+    known = 0.0 < item.variance_m2 < math.inf
+    return (item.variance_m2 if known else _DEFAULT_VARIANCE_M2) + anchor.position_sd_m**2
+
+
+def _judgements(solution: Solution, measurements: Measurements) -> Iterable[tuple[Reason, float, float, int, float]]:
+    """Reason, d², gate, degrees of freedom and innovation of each measurement; NaN where there is none."""
+    innovation_m = measurements.range_m - np.linalg.norm(measurements.anchors_m - solution.fix.position_m, axis=1)
+    if measurements.shared_offset:
+        innovation_m -= np.min(innovation_m, initial=math.inf)
+    gated = not math.isnan(solution.gate)
+    return [
+        (reason, distance_sq, solution.gate, int(gated), error_m)
+        for reason, distance_sq, error_m in zip(
+            solution.reasons, solution.mahalanobis_sq.tolist(), innovation_m.tolist(), strict=True
+        )
+    ]

@@ -1,32 +1,42 @@
 """Positions from ranging rounds, and a verdict on every range."""
 
-import math
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-from geometry_msgs.msg import PoseWithCovariance
-from mine_loc_interfaces.msg import Anchor, AnchorMap, MeasurementVerdictArray, UwbPose, UwbRangeArray
+from mine_loc_interfaces.msg import (
+    Anchor,
+    AnchorMap,
+    LinkState,
+    MeasurementVerdictArray,
+    TdoaArray,
+    UwbPose,
+    UwbRangeArray,
+)
 from mine_loc_interfaces.srv import SetAnchorEnabled
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_point
+from mine_loc_core.nodes.conversions import to_point, to_stamp_ns
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
+from mine_loc_core.verdicts import Verdict
+from mine_loc_uwb.anchor_frame import anchor_frame
 from mine_loc_uwb.fix import Fix, FixStatus
+from mine_loc_uwb.nodes.solver_messages import measured_arrivals, measured_ranges, to_pose
 from mine_loc_uwb.parameters import UwbSolverParameters
-from mine_loc_uwb.round_solver import MeasuredRange, RoundSolver
+from mine_loc_uwb.round_solver import RoundSolver, rehearse
 
 _PERIOD_S = 1.0
 _FORGET_AFTER_S = 60.0
 
 
 class UwbSolver(NodeBase):
-    """Solves each round as it comes."""
+    """Solves each round and each blink as it comes."""
 
     parameter_class = UwbSolverParameters
 
@@ -37,29 +47,40 @@ class UwbSolver(NodeBase):
         """Load site and people; a bad file refuses the transition."""
         folder = Path(self.parameters.site)
         self._site = load_site(folder)
+        self._frame = anchor_frame(self._site, self.parameters.frame)
         self._people = PeopleFile(folder)
-        self._solver = RoundSolver(self._site.anchors, self.parameters)
+        self._solver = RoundSolver(self._frame.anchors, self.parameters)
         self._poses = self.publish_to(UwbPose, "uwb/pose", EVENTS)
         self._verdicts = self.publish_to(MeasurementVerdictArray, "uwb/verdicts", EVENTS)
         self._map = self.publish_to(AnchorMap, "uwb/anchors", LATCHED)
         self._map_version = 0
         self._rounds = self._fixes = 0
+        self._refused: Counter[str] = Counter()
         self._heard_s: dict[int, float] = {}
         self.serve(SetAnchorEnabled, "~/set_anchor_enabled", self._set_anchor_enabled)
         self.every(_PERIOD_S, self._each_second)
         self.subscribe(UwbRangeArray, "uwb/ranges", self._on_round, EVENTS)
+        self.subscribe(TdoaArray, "uwb/tdoa", self._on_blink, EVENTS)
+        self.subscribe(LinkState, "uwb/link_state", self._on_link_state, EVENTS)
 
     def activate(self) -> None:
-        """Tell the map."""
+        """Tell the map, and compile what the first round would wait for."""
+        rehearse(self.parameters, self._site.dimensions)
         self._publish_map()
 
     def parameters_changed(self) -> None:
-        """The solver takes new limits at once."""
+        """The solver takes new methods and limits at once."""
         self._solver.parameters = self.parameters
 
+    def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
+        """Stamps before and after do not belong together."""
+        self._solver.reset()
+
     def health(self) -> Iterable[Health]:
-        """How many rounds gave a position."""
-        figures = {"rounds": self._rounds, "fixes": self._fixes, "disabled_anchors": sorted(self._solver.disabled)}
+        """How many rounds gave a position, and what was refused."""
+        figures: dict[str, object] = {"rounds": self._rounds, "fixes": self._fixes}
+        figures["disabled_anchors"] = sorted(self._solver.disabled)
+        figures |= {f"refused_{reason}": count for reason, count in sorted(self._refused.items())}
         yield Health("solver", Level.OK, self.parameters.method, figures)
         if self._people.error:
             yield Health("people.yaml", Level.WARN, self._people.error)
@@ -72,16 +93,29 @@ class UwbSolver(NodeBase):
             self._solver.forget(tag_id)
 
     def _on_round(self, array: UwbRangeArray) -> None:
-        ranges = [MeasuredRange(item.anchor_id, item.range, item.range_variance) for item in array.ranges]
-        fix, verdicts = self._solver.solve(array.tag_id, ranges, self._height_m(array.tag_id))
+        stamp_ns, height_m = to_stamp_ns(array.header.stamp), self._height_m(array.tag_id)
+        found = self._solver.solve(array.tag_id, stamp_ns, self.now_ns(), measured_ranges(array), height_m)
+        self._publish(*found, array, self.parameters.method)
+
+    def _on_blink(self, array: TdoaArray) -> None:
+        stamp_ns, height_m = to_stamp_ns(array.header.stamp), self._height_m(array.tag_id)
+        variance_m2 = self.parameters.arrival_sd_m**2
+        arrivals = measured_arrivals(array, variance_m2)
+        found = self._solver.solve_blink(array.tag_id, stamp_ns, self.now_ns(), arrivals, height_m)
+        self._publish(*found, array, self.parameters.tdoa_method)
+
+    def _on_link_state(self, state: LinkState) -> None:
+        stamp_ns = to_stamp_ns(state.header.stamp)
+        self._solver.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
+
+    def _publish(self, fix: Fix, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str) -> None:
         self._heard_s[array.tag_id] = time.monotonic()
         self._rounds += 1
         self._fixes += fix.status is FixStatus.OK
-        rejected = sum(not verdict.accepted for verdict in verdicts)
-        self._poses.publish(_to_pose(fix, array, self._site.map_frame, self.parameters.method, rejected))
-        self._verdicts.publish(
-            to_verdict_array(verdicts, array.header.stamp, self._site.map_frame, tag_id=array.tag_id)
-        )
+        refused = [verdict.reason.name.lower() for verdict in verdicts if not verdict.accepted]
+        self._refused.update(refused)
+        self._poses.publish(to_pose(fix, array, self._frame.name, method, len(refused)))
+        self._verdicts.publish(to_verdict_array(verdicts, array.header.stamp, self._frame.name, tag_id=array.tag_id))
 
     def _height_m(self, tag_id: int) -> float | None:
         if self._site.dimensions == 3:
@@ -102,8 +136,8 @@ class UwbSolver(NodeBase):
         self._map_version += 1
         message = AnchorMap(map_version=self._map_version)
         message.header.stamp = self.get_clock().now().to_msg()
-        message.header.frame_id = self._site.map_frame
-        for anchor in self._site.anchors:
+        message.header.frame_id = self._frame.name
+        for anchor in self._frame.anchors:
             variance = anchor.position_sd_m**2
             message.anchors.append(
                 Anchor(
@@ -116,34 +150,6 @@ class UwbSolver(NodeBase):
                 )
             )
         self._map.publish(message)
-
-
-def _to_pose(fix: Fix, array: UwbRangeArray, frame_id: str, method: str, rejected: int) -> UwbPose:
-    pose = PoseWithCovariance()
-    pose.pose.position = to_point(fix.position_m)
-    pose.pose.orientation.w = 1.0
-    covariance = [0.0] * 36
-    for row in range(3):
-        for column in range(3):
-            covariance[6 * row + column] = float(fix.covariance_m2[row, column])
-    for index in (21, 28, 35):
-        covariance[index] = -1.0
-    pose.covariance = covariance
-    message = UwbPose(
-        tag_id=array.tag_id,
-        seq=array.seq,
-        pose=pose,
-        method=method,
-        dimensions=fix.dimensions,
-        ranges_used=min(fix.ranges_used, 255),
-        ranges_rejected=min(rejected, 255),
-        residual_rms=fix.residual_rms_m,
-        gdop=fix.gdop if math.isfinite(fix.gdop) else math.inf,
-        status=int(fix.status),
-    )
-    message.header.stamp = array.header.stamp
-    message.header.frame_id = frame_id
-    return message
 
 
 def main() -> int:

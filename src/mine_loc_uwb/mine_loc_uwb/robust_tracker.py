@@ -1,0 +1,210 @@
+"""Our tracker, the default: ranges one by one at their own instants, biases of links on line, one-sided noise.
+
+What a range may be wrong by is modelled, not cut off: white noise, a bias of each link and of the tag that changes
+slowly, and an excess when the link is obstructed, believed as far as its own ranges or the classifier say so. A gate
+refuses what even that does not explain. When most ranges are refused for a while, the tracker begins anew where they
+agree, if at least three do and the person can have got there (else a cluster of wrong ranges would capture it).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from mine_loc_core.gates import chi2_quantile
+from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.verdicts import Reason
+from mine_loc_uwb import tracker_kernel as kernel
+from mine_loc_uwb.consensus_fix import Consensus, consensus_fix
+from mine_loc_uwb.fix import Array, Fix, FixStatus, no_fix
+from mine_loc_uwb.measurements import Measurements
+from mine_loc_uwb.solver import Solution
+
+Ids = npt.NDArray[np.uint64]
+Slots = npt.NDArray[np.int64]
+_REASON = {kernel.ACCEPTED: Reason.ACCEPTED, kernel.GATE: Reason.GATE, kernel.KINEMATIC: Reason.KINEMATIC}
+_ENOUGH_AGREE = 3
+_MOST_LINKS = 16
+_OFFSET_SD_M = 100.0
+_LONGEST_DOUBT_STEP_S = 0.5
+"""A silence is not doubt: one round after it adds no more than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobustTrackerSettings:
+    """The person and the radio in physical units."""
+
+    acceleration_density_m2_s3: float = 0.1
+    """Spectral density of white acceleration: people walk steadily; a turn is seen within some rounds."""
+    bias_sd_m: float = 0.03
+    bias_time_s: float = 100.0
+    """Of a link, beyond what is calibrated."""
+    common_bias_sd_m: float = 0.05
+    common_bias_time_s: float = 100.0
+    """Of all links of a tag: its own antenna delay."""
+    nlos_scale_m: float = 0.6
+    """Mean excess of an obstructed link; 0.3 to 0.9 m were measured in buildings (hardware notes D.1)."""
+    nlos_time_s: float = 1.0
+    """A walker passes what obstructs a link within some such times."""
+    nlos_share: float = 0.5
+    """Share of links that are obstructed where nothing is known of them."""
+    top_speed_m_s: float = 3.0
+    first_speed_sd_m_s: float = 1.0
+    gate: float = 0.9999
+    """Probability that a range within the law passes."""
+    reopen_after_s: float = 2.0
+    """Most ranges refused for so long: begin anew where they agree."""
+    guard_s: float = 10.0
+    """So long against all ranges, unanimous, before a place is believed that nobody can have walked to."""
+    restart_after_s: float = 30.0
+    """After such a silence nothing of the old state counts."""
+    max_start_sd_m: float = 5.0
+    """A first round that leaves more than this undetermined starts nothing."""
+
+    def noise(self) -> Array:
+        """The settings the kernel uses, in its order."""
+        values = np.empty(9)
+        values[kernel.ACCELERATION] = self.acceleration_density_m2_s3
+        values[kernel.BIAS_SD], values[kernel.BIAS_TIME] = self.bias_sd_m, self.bias_time_s
+        values[kernel.COMMON_SD], values[kernel.COMMON_TIME] = self.common_bias_sd_m, self.common_bias_time_s
+        values[kernel.NLOS_SCALE], values[kernel.NLOS_TIME] = self.nlos_scale_m, self.nlos_time_s
+        values[kernel.NLOS_SHARE], values[kernel.TOP_SPEED] = self.nlos_share, self.top_speed_m_s
+        return values
+
+
+class RobustTracker:
+    """Tracks one tag; see `Solver`."""
+
+    def __init__(self, settings: RobustTrackerSettings | None = None) -> None:
+        self._settings = settings or RobustTrackerSettings()
+        self._noise = self._settings.noise()
+        self._gate = chi2_quantile(self._settings.gate, 1)
+        self._x, self._P = np.empty(0), np.empty((0, 0))
+        self._started = False
+        self._stamp_ns = self._trusted_ns = 0
+        self._doubt_s = 0.0
+        self._slot: dict[int, int] = {}
+        self._known = b"", np.empty(0, np.int64)
+        self._link_nlos = np.empty(0)
+
+    def solve(self, measurements: Measurements) -> Solution:
+        """See `Solver`."""
+        gone_s = max(measurements.stamp_ns - self._stamp_ns, 0) / NS_PER_S
+        if not self._started or gone_s > self._settings.restart_after_s:
+            return self._begin(measurements)
+        slots = self._slots_of(measurements.anchor_ids)
+        codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
+        quality = np.empty(3)
+        kernel.take_round(
+            self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
+            measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
+            self._link_nlos, gone_s, _OFFSET_SD_M * measurements.shared_offset, self._gate, self._noise,
+            codes, deviances, quality,
+        )  # fmt: skip
+        self._stamp_ns = measurements.stamp_ns
+        reasons = tuple([_REASON[code] for code in codes.tolist()])
+        reasons = self._judge_agreement(measurements, reasons, int(quality[0]), gone_s)
+        return Solution(self._fix(measurements, quality), reasons, deviances, self._gate)
+
+    def _judge_agreement(
+        self, measurements: Measurements, reasons: tuple[Reason, ...], accepted: int, gone_s: float
+    ) -> tuple[Reason, ...]:
+        """Doubt grows while most ranges are refused; in the end the tracker begins anew where they agree."""
+        if not reasons:
+            return reasons
+        if 2 * accepted > len(reasons):
+            self._doubt_s, self._trusted_ns = 0.0, measurements.stamp_ns
+            return reasons
+        self._doubt_s += min(gone_s, _LONGEST_DOUBT_STEP_S)
+        if self._doubt_s < self._settings.reopen_after_s or measurements.shared_offset:
+            return reasons
+        found = self._consensus(measurements)
+        if found is None or found.ambiguous or found.agreeing.sum() < _ENOUGH_AGREE:
+            return reasons
+        if self._can_be_at(found, measurements.stamp_ns):
+            self._place(measurements, found.position_m, found.covariance_m2)
+            return tuple(Reason.ACCEPTED if agrees else Reason.GATE for agrees in found.agreeing)
+        return tuple(
+            Reason.CAPTURE_GUARD if agrees else reason for agrees, reason in zip(found.agreeing, reasons, strict=True)
+        )
+
+    def _can_be_at(self, found: Consensus, stamp_ns: int) -> bool:
+        """Whether the person can have got there since ranges were last believed, or all have agreed on it for long."""
+        gone_s = (stamp_ns - self._trusted_ns) / NS_PER_S
+        d = len(found.position_m)
+        sd_m = math.sqrt(np.trace(self._P[:d, :d]) + np.trace(found.covariance_m2))
+        way_m = float(np.linalg.norm(found.position_m - self._x[:d]))
+        unanimous = len(found.agreeing) > _ENOUGH_AGREE and bool(found.agreeing.all())
+        return way_m <= self._settings.top_speed_m_s * gone_s + 2.0 * sd_m or (
+            unanimous and self._doubt_s >= self._settings.guard_s
+        )
+
+    def _begin(self, measurements: Measurements) -> Solution:
+        """Start from one round, if it determines a place well enough."""
+        count, dimensions = len(measurements), measurements.dimensions
+        unknown = np.full(count, math.nan)
+        if count < dimensions + measurements.shared_offset:
+            fix = no_fix(FixStatus.TOO_FEW_RANGES, dimensions, count)
+            return Solution(fix, (Reason.NOT_INITIALISED,) * count, unknown, self._gate)
+        found = self._consensus(measurements)
+        if found is None or math.sqrt(np.trace(found.covariance_m2)) > self._settings.max_start_sd_m:
+            fix = no_fix(FixStatus.DEGENERATE, dimensions, count)
+            return Solution(fix, (Reason.DEGENERATE,) * count, unknown, self._gate)
+        self._place(measurements, found.position_m, found.covariance_m2)
+        reasons = tuple(Reason.ACCEPTED if agrees or found.ambiguous else Reason.GATE for agrees in found.agreeing)
+        quality = np.array([sum(reason is Reason.ACCEPTED for reason in reasons), math.nan, math.nan])
+        return Solution(self._fix(measurements, quality), reasons, unknown, self._gate)
+
+    def _consensus(self, measurements: Measurements) -> Consensus | None:
+        sd_m = math.hypot(math.sqrt(float(np.mean(measurements.variance_m2))), self._settings.bias_sd_m)
+        return consensus_fix(
+            measurements.anchors_m,
+            measurements.range_m,
+            range_sd_m=sd_m,
+            nlos_scale_m=self._settings.nlos_scale_m,
+            height_m=measurements.height_m,
+        )
+
+    def _place(self, measurements: Measurements, position_m: Array, covariance_m2: Array) -> None:
+        """Begin at a place, at rest, with nothing known of the links."""
+        d = len(position_m)
+        self._x, self._P = np.zeros(2 * d + 1), np.zeros((2 * d + 1, 2 * d + 1))
+        self._x[:d], self._P[:d, :d] = position_m, covariance_m2
+        self._P[range(d, 2 * d), range(d, 2 * d)] = self._settings.first_speed_sd_m_s**2
+        self._P[2 * d, 2 * d] = self._settings.common_bias_sd_m**2
+        self._slot, self._known, self._link_nlos = {}, (b"", np.empty(0, np.int64)), np.empty(0)
+        self._stamp_ns = self._trusted_ns = measurements.stamp_ns
+        self._doubt_s, self._started = 0.0, True
+
+    def _slots_of(self, anchor_ids: Ids) -> Slots:
+        """Place of each link's bias in the state; the same anchors as last time are the usual case."""
+        key = anchor_ids.tobytes()
+        if key != self._known[0]:
+            self._known = key, np.array([self._slot_of(anchor) for anchor in anchor_ids.tolist()], np.int64)
+        return self._known[1]
+
+    def _slot_of(self, anchor_id: int) -> int:
+        """A new link takes a new place, or the place of the one that was used longest ago."""
+        slot = self._slot.pop(anchor_id, None)
+        if slot is None:
+            if len(self._slot) < _MOST_LINKS:
+                slot = len(self._slot)
+                self._x, self._P = np.append(self._x, 0.0), np.pad(self._P, ((0, 1), (0, 1)))
+                self._link_nlos = np.append(self._link_nlos, 0.0)
+            else:
+                slot = self._slot.pop(next(iter(self._slot)))
+            bias = len(self._x) - len(self._link_nlos) + slot
+            self._x[bias], self._P[bias], self._P[:, bias] = 0.0, 0.0, 0.0
+            self._P[bias, bias], self._link_nlos[slot] = self._settings.bias_sd_m**2, self._settings.nlos_share
+        self._slot[anchor_id] = slot
+        return slot
+
+    def _fix(self, measurements: Measurements, quality: Array) -> Fix:
+        d = measurements.dimensions
+        position, covariance = self._x[:3].copy(), np.zeros((3, 3))
+        if measurements.height_m is not None:
+            position[2] = measurements.height_m
+        covariance[:d, :d] = self._P[:d, :d]
+        used, rms, dilution = quality.tolist()
+        return Fix(FixStatus.OK, position, covariance, d, int(used), rms, dilution)

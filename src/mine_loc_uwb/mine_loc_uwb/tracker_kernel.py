@@ -1,0 +1,241 @@
+"""The arithmetic of `robust_tracker`: an extended Kalman filter over position, velocity and range biases.
+
+State x, of size 2d + 1 + L: position (d,), velocity (d,), what all ranges of the tag have in common, and the bias of
+each of L links. The first covers the tag's own antenna delay; for the arrivals of a blink it is their unknown offset.
+Ranges are taken one by one, each at its own instant, by the score of their one-sided noise (`one_sided_noise`).
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from mine_loc_uwb.fix import Array
+from mine_loc_uwb.geometry import direction, gdop
+from mine_loc_uwb.one_sided_noise import deviance, score
+
+Integers = npt.NDArray[np.int64]
+
+ACCELERATION, BIAS_SD, BIAS_TIME, COMMON_SD, COMMON_TIME, NLOS_SCALE, NLOS_TIME, NLOS_SHARE, TOP_SPEED = range(9)
+"""Places of the settings in the array `noise`."""
+
+ACCEPTED, GATE, KINEMATIC = range(3)
+"""What became of a range."""
+
+_OUTLIER_DENSITY_PER_M = 2e-4
+_LEAST_NLOS, _MOST_NLOS = 0.01, 0.97
+_IMPOSSIBLE_SDS = 5.0
+
+
+@njit(cache=True)
+def predict(x: Array, P: Array, dimensions: int, gone_s: float, noise: Array) -> None:
+    """White acceleration moves the person; biases return to 0 with their time constants (Gauss–Markov)."""
+    d, size = dimensions, len(x)
+    q = noise[ACCELERATION] * gone_s
+    common = math.exp(-gone_s / noise[COMMON_TIME])
+    link = math.exp(-gone_s / noise[BIAS_TIME])
+    for i in range(d):
+        x[i] += gone_s * x[d + i]
+        for j in range(size):
+            P[i, j] += gone_s * P[d + i, j]
+    for i in range(d):
+        for j in range(size):
+            P[j, i] += gone_s * P[j, d + i]
+        P[i, i] += q * gone_s * gone_s / 3.0
+        P[i, d + i] += q * gone_s / 2.0
+        P[d + i, i] += q * gone_s / 2.0
+        P[d + i, d + i] += q
+    for i in range(2 * d, size):
+        fade = common if i == 2 * d else link
+        x[i] *= fade
+        for j in range(size):
+            P[i, j] *= fade
+            P[j, i] *= fade
+        deviation = noise[COMMON_SD] if i == 2 * d else noise[BIAS_SD]
+        P[i, i] += deviation * deviation * (1.0 - fade * fade)
+
+
+@njit(cache=True)
+def open_offset(x: Array, P: Array, dimensions: int, offset_m: float, offset_sd_m: float) -> None:
+    """Nothing is known of the offset of a new blink but a first guess."""
+    common = 2 * dimensions
+    x[common] = offset_m
+    P[common, :] = 0.0
+    P[:, common] = 0.0
+    P[common, common] = offset_sd_m * offset_sd_m
+
+
+@njit(cache=True)
+def take_range(
+    x: Array,
+    P: Array,
+    dimensions: int,
+    anchor_m: Array,
+    slot: int,
+    range_m: float,
+    variance_m2: float,
+    since_s: float,
+    height_m: float,
+    nlos_probability: float,
+    reach_m: float,
+    gate: float,
+    noise: Array,
+    work: Array,
+) -> tuple[int, float, float]:
+    """Update (x, P) by one range; returns what became of it, its deviance and P(NLOS | range).
+
+    `nlos_probability` is the belief before. The distance's curvature over the spread of the position is allowed for to
+    second order, because people pass anchors closely. `reach_m` is how far the person can have come since the last
+    fix. `work` is (3, size) of scratch.
+    """
+    d, size, common, bias = dimensions, len(x), 2 * dimensions, 2 * dimensions + 1 + slot
+    at, unit, gain = work[0], work[1], work[2]
+    for axis in range(d):
+        at[axis] = x[axis] + since_s * x[d + axis]
+    distance = direction(at[:d], anchor_m, height_m, unit[:d])
+    along = spread = 0.0
+    for i in range(size):
+        gain[i] = P[i, common] + P[i, bias]
+        for axis in range(d):
+            gain[i] += unit[axis] * (P[i, axis] + since_s * P[i, d + axis])
+    for axis in range(d):
+        for other in range(d):
+            along += unit[axis] * unit[other] * P[axis, other]
+        spread += P[axis, axis]
+    curvature = 0.5 * max(spread - along, 0.0) / distance
+    variance = gain[common] + gain[bias] + 2.0 * curvature * curvature + variance_m2
+    for axis in range(d):
+        variance += unit[axis] * (gain[axis] + since_s * gain[d + axis])
+    error = range_m - distance - curvature - x[common] - x[bias]
+    distance_sq = deviance(error, variance, nlos_probability, noise[NLOS_SCALE])
+    if distance_sq > gate:
+        impossible = error < -(reach_m + _IMPOSSIBLE_SDS * math.sqrt(variance))
+        return (KINEMATIC if impossible else GATE), distance_sq, nlos_probability
+    first, second, nlos = score(error, variance, nlos_probability, noise[NLOS_SCALE], _OUTLIER_DENSITY_PER_M)
+    second = min(max(second, 0.0), 1.0 / variance)
+    for i in range(size):
+        x[i] += first * gain[i]
+        for j in range(size):
+            P[i, j] -= second * gain[i] * gain[j]
+    return ACCEPTED, distance_sq, nlos
+
+
+@njit(cache=True)
+def take_round(
+    x: Array,
+    P: Array,
+    dimensions: int,
+    anchors_m: Array,
+    slots: Integers,
+    range_m: Array,
+    variance_m2: Array,
+    since_s: Array,
+    height_m: float,
+    los_probability: Array,
+    link_nlos: Array,
+    gone_s: float,
+    offset_sd_m: float,
+    gate: float,
+    noise: Array,
+    codes: Integers,
+    deviances: Array,
+    quality: Array,
+) -> None:
+    """Predict by `gone_s` and take all ranges of a round.
+
+    What fits best is taken first, so that it decides what becomes of the rest. `link_nlos` (L,) is how far each link is
+    believed to be obstructed by its own ranges; belief fades to the share of links that are. A judgement of the link
+    given beside the range (`los_probability`, at even odds) shifts it. `offset_sd_m` > 0 says that the ranges are
+    arrivals with an unknown offset. Leaves in `codes` and `deviances` (n,) what became of each range, in `quality` (3,)
+    how many were accepted, the root mean square of what they differ by from the new state [m], and their dilution of
+    precision.
+    """
+    work = np.empty((3, len(x)))
+    predict(x, P, dimensions, gone_s, noise)
+    if offset_sd_m > 0.0:
+        first_m = _first_offset(x, dimensions, anchors_m, slots, range_m, height_m, work)
+        open_offset(x, P, dimensions, first_m, offset_sd_m)
+    memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
+    todo = np.ones(len(range_m), np.bool_)
+    for _ in range(len(range_m)):
+        number = _most_credible(x, dimensions, anchors_m, slots, range_m, height_m, todo, work)
+        todo[number] = False
+        slot = slots[number]
+        belief = share + memory * (link_nlos[slot] - share)
+        belief = _shifted(belief, los_probability[number])
+        codes[number], deviances[number], link_nlos[slot] = take_range(
+            x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
+            height_m, belief, gone_s * noise[TOP_SPEED], gate, noise, work,
+        )  # fmt: skip
+    _judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
+
+
+@njit(cache=True)
+def _judge_round(
+    x: Array,
+    dimensions: int,
+    anchors_m: Array,
+    slots: Integers,
+    range_m: Array,
+    since_s: Array,
+    height_m: float,
+    codes: Integers,
+    quality: Array,
+) -> None:
+    d = dimensions
+    at, unit, used, squares = np.empty(d), np.empty(d), np.zeros(len(range_m)), 0.0
+    for number in range(len(range_m)):
+        if codes[number] != ACCEPTED:
+            continue
+        for axis in range(d):
+            at[axis] = x[axis] + since_s[number] * x[d + axis]
+        distance = direction(at, anchors_m[number], height_m, unit)
+        squares += (range_m[number] - distance - x[2 * d] - x[2 * d + 1 + slots[number]]) ** 2
+        used[number] = 1.0
+    quality[0] = used.sum()
+    quality[1] = math.sqrt(squares / quality[0]) if quality[0] > 0.0 else math.nan
+    quality[2] = gdop(x[:d], anchors_m, used, height_m)
+
+
+@njit(cache=True)
+def _shifted(belief: float, los_probability: float) -> float:
+    """Belief in an obstruction after a judgement of the link; NaN = there is none."""
+    if not math.isnan(los_probability):
+        against = belief * (1.0 - los_probability)
+        belief = against / (against + (1.0 - belief) * los_probability)
+    return min(max(belief, _LEAST_NLOS), _MOST_NLOS)
+
+
+@njit(cache=True)
+def _most_credible(
+    x: Array,
+    dimensions: int,
+    anchors_m: Array,
+    slots: Integers,
+    range_m: Array,
+    height_m: float,
+    todo: npt.NDArray[np.bool_],
+    work: Array,
+) -> int:
+    """The range, of those still to do, that differs least from the prediction."""
+    best, least = 0, math.inf
+    for number in range(len(range_m)):
+        if todo[number]:
+            distance = direction(x[:dimensions], anchors_m[number], height_m, work[1, :dimensions])
+            error = abs(range_m[number] - distance - x[2 * dimensions] - x[2 * dimensions + 1 + slots[number]])
+            if error <= least:
+                best, least = number, error
+    return best
+
+
+@njit(cache=True)
+def _first_offset(
+    x: Array, dimensions: int, anchors_m: Array, slots: Integers, range_m: Array, height_m: float, work: Array
+) -> float:
+    """The least of the arrivals' offsets: excess ways only make them greater."""
+    least = math.inf
+    for number in range(len(range_m)):
+        distance = direction(x[:dimensions], anchors_m[number], height_m, work[1, :dimensions])
+        least = min(least, range_m[number] - distance - x[2 * dimensions + 1 + slots[number]])
+    return least
