@@ -68,6 +68,7 @@ wanted_workspace() {
 
 # The solvers' compiled code is cached beside their sources; without this the first node to start would wait for it.
 compile_solvers() (
+    set +u  # the workspace's own set-up reads unset variables
     # shellcheck disable=SC1091
     . ./env.sh
     python -c 'from mine_loc_uwb import parameters, round_solver; round_solver.rehearse(parameters.UwbSolverParameters(), 2)'
