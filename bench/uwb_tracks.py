@@ -33,6 +33,7 @@ def measurements_of(
     height_m: float | None,
     ids: Sequence[int] | None = None,
     since_s: Array | None = None,
+    los_probability: Array | None = None,
 ) -> Measurements:
     """One round of ranges; NaN, negative and zero ones are left out, as the node does."""
     good = np.isfinite(range_m) & (range_m > 0.0)
@@ -45,7 +46,7 @@ def measurements_of(
         range_m=range_m[good],
         variance_m2=np.full(count, sd_m**2),
         since_s=np.zeros(count) if since_s is None else since_s[good],
-        los_probability=np.full(count, np.nan),
+        los_probability=np.full(count, np.nan) if los_probability is None else los_probability[good],
         receive_power_dbm=np.full(count, np.nan),
         height_m=height_m,
     )
