@@ -1,10 +1,9 @@
 """Fitting a range polynomial: reweighted least squares, degree by cross-validation (paper A, 2.2.3).
 
-The paper solves normal equations in powers of the range. Here the excess (measured minus true range) is expanded in
-Chebyshev polynomials over the interval of the pairs and solved by singular values, so nothing is squared that is badly
-scaled already; degree 0 of the excess is a mere shift. Errors without line of sight are skewed, with a long tail to one
-side, which draws a mean away from where most ranges lie: the least sum of absolute errors is the default, the paper's
-least squares a choice.
+The paper solves normal equations in powers of the range. Here the true range is expanded in Bernstein polynomials over
+the interval of the pairs and solved by an orthogonal factorisation, with bounds that make the control values rise.
+Errors without line of sight are skewed, with a long tail to one side, which draws a mean away from where most ranges
+lie: the least sum of absolute errors is the default, the paper's least squares a choice.
 """
 
 from dataclasses import dataclass
@@ -12,10 +11,10 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import chebyshev
+from scipy.optimize import lsq_linear
 
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_uwb.range_polynomial import RangePolynomial
+from mine_loc_uwb.range_polynomial import RangePolynomial, bernstein_basis
 
 Array = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.int64]
@@ -27,7 +26,10 @@ _ENDS = (0.005, 0.995)
 _ROUNDS = 50
 _SMALLEST_ERROR_M = 0.005
 """Absolute errors below count as squares: under the noise of any range, and no weight grows without bound."""
-_CONVERGED_M = 1e-4
+_CONVERGED_M = 1e-3
+_LEAST_SLOPE = 0.05
+"""Of true over measured range: less would make one distance of many."""
+_LEAST_TRUE_M = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,17 +40,16 @@ class PolynomialFit:
     held_out_m: Array
     """True ranges (n,) as predicted for each pair by the polynomials of the folds that had not seen its group."""
     loss_m_by_degree: tuple[float, ...]
-    """Held-out loss of degrees 0 (a shift), 1, 2 ... of the excess: mean absolute or root mean squared error [m]."""
+    """Held-out loss of degrees 1, 2 ...: mean absolute or root mean squared error [m]."""
 
 
 def fit_polynomial(
-    measured_m: Array, true_m: Array, group: Groups, *, loss: Loss = "absolute", max_degree: int = 5, folds: int = 10
+    measured_m: Array, true_m: Array, group: Groups, *, loss: Loss = "absolute", max_degree: int = 6, folds: int = 10
 ) -> PolynomialFit:
     """Fit pairs (n,), all finite; pairs of one group (n,), those of one place, are held out together.
 
     Of the degrees whose held-out loss is within one standard error of the least (Breiman et al. 1984), the lowest is
-    taken, and lower ones still until the polynomial rises over its interval. Raises ConfigurationError when there are
-    fewer than LEAST_PAIRS pairs or two groups, or no polynomial that rises.
+    taken. Raises ConfigurationError when there are fewer than LEAST_PAIRS pairs or two groups.
     """
     names, group = np.unique(group, return_inverse=True)
     if len(measured_m) < LEAST_PAIRS or len(names) < 2:
@@ -57,17 +58,14 @@ def fit_polynomial(
             f"allowed: {LEAST_PAIRS} or more in at least 2 groups"
         )
     fold = fold_of_groups(len(names), folds)[group]
-    degrees = range(min(max_degree, max(len(names) - 2, 0)) + 1)
+    degrees = range(1, max(min(max_degree, len(names) - 1), 1) + 1)
     held_out_m = np.stack([_held_out(measured_m, true_m, fold, degree, loss) for degree in degrees])
     losses = np.abs(held_out_m - true_m) ** (2 if loss == "squares" else 1)
-    by_degree = losses.mean(axis=1)
-    for degree in range(_simplest(losses, fold), -1, -1):
-        sd_m = float(np.sqrt(np.mean((held_out_m[degree] - true_m) ** 2)))
-        polynomial = _fit_degree(measured_m, true_m, degree, loss, sd_m)
-        if polynomial.rises():
-            told = np.sqrt(by_degree) if loss == "squares" else by_degree
-            return PolynomialFit(polynomial, held_out_m[degree], tuple(told.tolist()))
-    raise ConfigurationError("pairs without line of sight: no polynomial of theirs rises; allowed: true ranges above 0")
+    best = _simplest(losses, fold)
+    sd_m = float(np.sqrt(np.mean((held_out_m[best] - true_m) ** 2)))
+    polynomial = _fit_degree(measured_m, true_m, degrees[best], loss, sd_m)
+    by_degree = losses.mean(axis=1) ** (0.5 if loss == "squares" else 1.0)
+    return PolynomialFit(polynomial, held_out_m[best], tuple(by_degree.tolist()))
 
 
 def fold_of_groups(groups: int, folds: int) -> Groups:
@@ -96,23 +94,31 @@ def _held_out(measured_m: Array, true_m: Array, fold: Groups, degree: int, loss:
 def _fit_degree(measured_m: Array, true_m: Array, degree: int, loss: Loss, sd_m: float) -> RangePolynomial:
     low_m, high_m = (float(end) for end in np.quantile(measured_m, _ENDS))
     high_m = max(high_m, low_m + 1e-3)
-    middle_m, half_m = 0.5 * (low_m + high_m), 0.5 * (high_m - low_m)
     used = (measured_m >= low_m) & (measured_m <= high_m)
-    basis = np.asarray(chebyshev.chebvander((measured_m[used] - middle_m) / half_m, degree), np.float64)
-    excess = _solve(basis, measured_m[used] - true_m[used], loss)
-    coefficients = -np.pad(excess, (0, max(2 - len(excess), 0)))
-    coefficients[:2] += middle_m, half_m
-    return RangePolynomial(tuple(coefficients.tolist()), (low_m, high_m), sd_m)
+    basis = bernstein_basis((measured_m[used] - low_m) / (high_m - low_m), degree)
+    control_m = _solve(basis, true_m[used], loss, _LEAST_SLOPE * (high_m - low_m) / degree)
+    return RangePolynomial(tuple(control_m.tolist()), (low_m, high_m), sd_m)
 
 
-def _solve(basis: Array, excess_m: Array, loss: Loss) -> Array:
-    """Coefficients of least squares, or of least absolute errors by reweighted least squares (Schlossmacher 1973)."""
-    coefficients = np.linalg.lstsq(basis, excess_m, rcond=None)[0]
-    for _ in range(_ROUNDS if loss == "absolute" else 0):
-        error_m = np.abs(basis @ coefficients - excess_m)
-        root_weight = 1.0 / np.sqrt(np.maximum(error_m, _SMALLEST_ERROR_M))
-        before = coefficients
-        coefficients = np.linalg.lstsq(basis * root_weight[:, None], excess_m * root_weight, rcond=None)[0]
-        if np.abs(coefficients - before).max() < _CONVERGED_M:
+def _solve(basis: Array, true_m: Array, loss: Loss, least_step_m: float) -> Array:
+    """Rising control values of least squares, or of least absolute errors by reweighting (Schlossmacher 1973).
+
+    The unknowns are the first control value and the steps to the next, each with its lower bound.
+    """
+    steps = np.cumsum(basis[:, ::-1], axis=1)[:, ::-1]
+    lower_m = np.full(basis.shape[1], least_step_m)
+    lower_m[0] = _LEAST_TRUE_M
+    root_weight, found = np.ones(len(basis)), lower_m
+    for _ in range(_ROUNDS if loss == "absolute" else 1):
+        triangle, rotated = _reduced(steps * root_weight[:, None], true_m * root_weight)
+        before, found = found, np.asarray(lsq_linear(triangle, rotated, (lower_m, np.inf)).x)
+        root_weight = 1.0 / np.sqrt(np.maximum(np.abs(steps @ found - true_m), _SMALLEST_ERROR_M))
+        if np.abs(found - before).max() < _CONVERGED_M:
             break
-    return np.asarray(coefficients)
+    return np.cumsum(found)
+
+
+def _reduced(matrix: Array, right: Array) -> tuple[Array, Array]:
+    """The same least-squares problem in as many rows as columns, by QR."""
+    orthogonal, triangle = np.linalg.qr(matrix)
+    return triangle, orthogonal.T @ right

@@ -26,7 +26,7 @@ class CalibrationOptions:
     bandwidth_mhz: int = 500
     prf_mhz: int = 64
     loss: Loss = "absolute"
-    max_degree: int = 5
+    max_degree: int = 6
     stamp_latency_s: float = 0.0
 
 

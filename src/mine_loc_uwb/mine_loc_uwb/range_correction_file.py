@@ -59,7 +59,7 @@ def range_correction_text(calibration: Calibration, date: str) -> str:
         content["nlos_polynomial"] = {
             "link_classes": [1, 2],
             "fitted_m": list(correction.nlos.fitted_m),
-            "chebyshev_m": list(correction.nlos.coefficients),
+            "control_m": list(correction.nlos.control_m),
             "residual_sd_m": correction.nlos.residual_sd_m,
         }
     told = {"before": calibration.before, "after": calibration.after, "held_out": calibration.held_out}
@@ -96,15 +96,15 @@ def _polynomial_problems(source: YamlSource, item: Mapping[str, Any] | None) -> 
         path: KeyPath = ("nlos_polynomial", "fitted_m")
         yield source.problem(path, f"[{low_m}, {high_m}] holds nothing; allowed: a shorter and a longer range")
     elif not _polynomial(item).rises():
-        path = ("nlos_polynomial", "chebyshev_m")
-        text = f"{item['chebyshev_m']} does not rise over [{low_m}, {high_m}]; allowed: true ranges above 0 that rise"
+        path = ("nlos_polynomial", "control_m")
+        text = f"{item['control_m']} does not rise; allowed: true ranges above 0 that rise"
         yield source.problem(path, text)
 
 
 def _polynomial(item: Mapping[str, Any]) -> RangePolynomial:
     low_m, high_m = item["fitted_m"]
-    coefficients = tuple(float(each) for each in item["chebyshev_m"])
-    return RangePolynomial(coefficients, (float(low_m), float(high_m)), float(item["residual_sd_m"]))
+    control_m = tuple(float(each) for each in item["control_m"])
+    return RangePolynomial(control_m, (float(low_m), float(high_m)), float(item["residual_sd_m"]))
 
 
 def _power_bias(item: Mapping[str, Any]) -> PowerBias:

@@ -5,7 +5,8 @@ distances at those instants: least mean absolute residual, each anchor's median 
 outliers count for nothing. Only motion along the links shows it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,7 @@ _STEP_S = 0.02
 _BLOCKS = 5
 _LEAST_RANGES = 50
 _LEAST_RADIAL_SPEED_M_S = 0.05
+_LEAST_STANDARD_ERROR_S = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +46,31 @@ class TimedRanges:
     track_ns: Integers  # (t,), rising
     track_m: Array  # (t, 3)
 
-    def residual_m(self, latency_s: float, which: npt.NDArray[np.bool_]) -> Array:
+    def only(self, which: npt.NDArray[np.bool_] | Integers) -> "TimedRanges":
+        """Those ranges that `which` picks."""
+        return replace(
+            self,
+            stamp_ns=self.stamp_ns[which],
+            range_m=self.range_m[which],
+            anchor=self.anchor[which],
+            anchor_m=self.anchor_m[which],
+        )
+
+    def residual_m(self, latency_s: float) -> Array:
         """Range minus true distance at the instants that a latency gives, NaN where the track does not reach."""
-        at_s = (self.stamp_ns[which] - self.track_ns[0]) / NS_PER_S - latency_s
+        at_s = (self.stamp_ns - self.track_ns[0]) / NS_PER_S - latency_s
         track_s = (self.track_ns - self.track_ns[0]) / NS_PER_S
         place_m = [np.interp(at_s, track_s, axis_m, left=np.nan, right=np.nan) for axis_m in self.track_m.T]
-        return np.asarray(
-            self.range_m[which] - np.linalg.norm(np.stack(place_m, axis=1) - self.anchor_m[which], axis=1)
-        )
+        return np.asarray(self.range_m - np.linalg.norm(np.stack(place_m, axis=1) - self.anchor_m, axis=1))
+
+
+def common_latency_s(found: Sequence[StampLatency]) -> float:
+    """Weighted mean of several tags' or runs' latencies; 0 without any, or where it is within two standard errors."""
+    if not found:
+        return 0.0
+    weight = np.array([max(each.standard_error_s, _LEAST_STANDARD_ERROR_S) ** -2 for each in found])
+    mean_s = float(np.average([each.latency_s for each in found], weights=weight))
+    return mean_s if abs(mean_s) > 2.0 / np.sqrt(weight.sum()) else 0.0
 
 
 def fit_stamp_latency(ranges: TimedRanges, *, most_s: float = 0.5) -> StampLatency:
@@ -63,29 +82,30 @@ def fit_stamp_latency(ranges: TimedRanges, *, most_s: float = 0.5) -> StampLaten
     inside &= ranges.stamp_ns <= ranges.track_ns[-1] - most_s * NS_PER_S
     if inside.sum() < _LEAST_RANGES:
         raise ConfigurationError(f"ranges within the true track: {inside.sum()}; allowed: {_LEAST_RANGES} or more")
-    shift_m = ranges.residual_m(0.5 * _STEP_S, inside) - ranges.residual_m(-0.5 * _STEP_S, inside)
+    ranges = ranges.only(inside)
+    shift_m = ranges.residual_m(0.5 * _STEP_S) - ranges.residual_m(-0.5 * _STEP_S)
     speed_m_s = float(np.mean(np.abs(shift_m))) / _STEP_S
     if speed_m_s < _LEAST_RADIAL_SPEED_M_S:
         raise ConfigurationError(
             f"speed along the links: {speed_m_s:.3f} m/s; allowed: {_LEAST_RADIAL_SPEED_M_S} m/s or more, "
             "since ranges of a tag at rest say nothing of their stamps"
         )
-    latency_s = _best(ranges, inside, most_s)
-    blocks = np.array_split(np.flatnonzero(inside)[np.argsort(ranges.stamp_ns[inside], kind="stable")], _BLOCKS)
-    found = [_best(ranges, np.isin(np.arange(len(inside)), block), most_s) for block in blocks]
+    latency_s = _best(ranges, most_s)
+    blocks = np.array_split(np.argsort(ranges.stamp_ns, kind="stable"), _BLOCKS)
+    found = [_best(ranges.only(block), most_s) for block in blocks]
     error_s = float(np.std(found, ddof=1) / np.sqrt(_BLOCKS))
-    return StampLatency(latency_s, error_s, _loss_m(ranges, inside, 0.0), _loss_m(ranges, inside, latency_s))
+    return StampLatency(latency_s, error_s, _loss_m(ranges, 0.0), _loss_m(ranges, latency_s))
 
 
-def _best(ranges: TimedRanges, which: npt.NDArray[np.bool_], most_s: float) -> float:
+def _best(ranges: TimedRanges, most_s: float) -> float:
     grid_s = np.arange(-most_s, most_s + 0.5 * _STEP_S, _STEP_S)
-    start_s = grid_s[int(np.argmin([_loss_m(ranges, which, float(each)) for each in grid_s]))]
+    start_s = grid_s[int(np.argmin([_loss_m(ranges, float(each)) for each in grid_s]))]
     bounds = max(start_s - _STEP_S, -most_s), min(start_s + _STEP_S, most_s)
-    return float(minimize_scalar(lambda at_s: _loss_m(ranges, which, float(at_s)), bounds=bounds, method="bounded").x)
+    return float(minimize_scalar(lambda at_s: _loss_m(ranges, float(at_s)), bounds=bounds, method="bounded").x)
 
 
-def _loss_m(ranges: TimedRanges, which: npt.NDArray[np.bool_], latency_s: float) -> float:
-    residual_m, anchor = ranges.residual_m(latency_s, which), ranges.anchor[which]
-    for each in np.unique(anchor):
-        residual_m[anchor == each] -= np.median(residual_m[anchor == each])
+def _loss_m(ranges: TimedRanges, latency_s: float) -> float:
+    residual_m = ranges.residual_m(latency_s)
+    for each in np.unique(ranges.anchor):
+        residual_m[ranges.anchor == each] -= np.median(residual_m[ranges.anchor == each])
     return float(np.mean(np.abs(residual_m)))
