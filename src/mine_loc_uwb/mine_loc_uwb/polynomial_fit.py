@@ -1,9 +1,10 @@
 """Fitting a range polynomial: reweighted least squares, degree by cross-validation (paper A, 2.2.3).
 
 The paper solves normal equations in powers of the range. Here the true range is expanded in Bernstein polynomials over
-the interval of the pairs and solved by an orthogonal factorisation, with bounds that make the control values rise.
-Errors without line of sight are skewed, with a long tail to one side, which draws a mean away from where most ranges
-lie: the least sum of absolute errors is the default, the paper's least squares a choice.
+the interval of the pairs and solved by QR, and the steps from one control value to the next are bound to rise
+(nonnegative least squares, Lawson and Hanson 1974). Errors without line of sight are skewed, with a long tail to one
+side, which draws a mean away from where most ranges lie: the least sum of absolute errors is the default, the paper's
+least squares a choice.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
+from scipy.optimize import nnls
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_uwb.range_polynomial import RangePolynomial, bernstein_basis
@@ -23,7 +24,7 @@ Loss = Literal["absolute", "squares"]
 LEAST_PAIRS = 20
 _ENDS = (0.005, 0.995)
 """Shares of the measured ranges between which the polynomial holds, so that a stray range does not widen it."""
-_ROUNDS = 50
+_ROUNDS = 25
 _SMALLEST_ERROR_M = 0.005
 """Absolute errors below count as squares: under the noise of any range, and no weight grows without bound."""
 _CONVERGED_M = 1e-3
@@ -111,11 +112,11 @@ def _solve(basis: Array, true_m: Array, loss: Loss, least_step_m: float) -> Arra
     root_weight, found = np.ones(len(basis)), lower_m
     for _ in range(_ROUNDS if loss == "absolute" else 1):
         triangle, rotated = _reduced(steps * root_weight[:, None], true_m * root_weight)
-        before, found = found, np.asarray(lsq_linear(triangle, rotated, (lower_m, np.inf)).x)
+        before, found = found, lower_m + nnls(triangle, rotated - triangle @ lower_m)[0]
         root_weight = 1.0 / np.sqrt(np.maximum(np.abs(steps @ found - true_m), _SMALLEST_ERROR_M))
         if np.abs(found - before).max() < _CONVERGED_M:
             break
-    return np.cumsum(found)
+    return np.asarray(np.cumsum(found))
 
 
 def _reduced(matrix: Array, right: Array) -> tuple[Array, Array]:
