@@ -24,14 +24,16 @@ sys.path.insert(0, str(Path(__file__).parent))
 import hanyang
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import spearmanr
 
 from mine_loc_core.site import Site, load_site
 from mine_loc_sim.radio_constants import INDUSTRIAL
 from mine_loc_sim.ranging_link import Radios, Ranges, TagLinks
 from mine_loc_sim.site_mine import mine_of
 from mine_loc_sim.wearer import Wearer
+from mine_loc_uwb.parameters import Dwm1000DriverParameters
 from mine_loc_uwb.range_calibration import CalibrationOptions, corrected_m, errors_by_label, fit_correction
-from mine_loc_uwb.range_correction import RangeCorrection
+from mine_loc_uwb.range_correction import CorrectedRanges, RangeCorrection
 from mine_loc_uwb.range_pairs import RangePairs, joined
 from mine_loc_uwb.received_power import los_probability_from_powers
 from mine_loc_uwb.stamp_latency import fit_stamp_latency
@@ -42,6 +44,7 @@ SCENES = Path(__file__).parent / "uwb_scenes"
 TEST_SEEDS, FIT_SEEDS, KNOB_SEEDS = range(1, 11), range(101, 121), range(201, 221)
 PLACES = 60
 ASIDE_M = 0.75
+DRIVER_SD_M = Dwm1000DriverParameters().range_sd_m
 TRIPOD = Wearer(loss_db=0.0, delay_m=0.0)
 
 
@@ -70,6 +73,7 @@ class Test:
 
     pairs: RangePairs
     nlos_probability: Reals
+    power_gap_db: Reals  # reception over first path
 
 
 def power_rule(ranges: Ranges) -> Reals:
@@ -107,7 +111,8 @@ def measure(scene: Scene, seed: int, judge: Judge) -> Test:
     ranges = links.measure(tag_m, np.zeros(PLACES), np.tile(anchors_m, (PLACES, 1, 1)), every, ways)
     group = np.repeat(np.arange(PLACES), count)
     pairs = RangePairs(ranges.range_m, ways.distance_m, ~ways.clear, ranges.receive_power_dbm, group)
-    return Test(pairs.only(ranges.received), judge(ranges)[ranges.received])
+    heard, gap_db = ranges.received, ranges.receive_power_dbm - ranges.first_path_power_dbm
+    return Test(pairs.only(heard), judge(ranges)[heard], gap_db[heard])
 
 
 def error_m(test: Test, range_m: Reals, *, nlos: bool) -> float:
@@ -121,9 +126,28 @@ def over_tests(values: list[float]) -> dict[str, float]:
     return {"mean": float(np.mean(values)), "sd_over_tests": float(np.std(values, ddof=1)), "n": len(values)}
 
 
-def judged_m(correction: RangeCorrection, test: Test) -> Reals:
+def unexplained(correction: RangeCorrection, tests: list[Test]) -> dict[str, float]:
+    """Rank correlation of the error that known NLOS links have left with what else the node knows of them."""
+    hidden = [(test, test.pairs.nlos) for test in tests]
+    left_m = np.concatenate([(corrected_m(correction, t.pairs) - t.pairs.true_m)[which] for t, which in hidden])
+    known = {
+        "measured_range": np.concatenate([t.pairs.measured_m[which] for t, which in hidden]),
+        "receive_power": np.concatenate([t.pairs.receive_power_dbm[which] for t, which in hidden]),
+        "power_gap": np.concatenate([t.power_gap_db[which] for t, which in hidden]),
+    }
+    return {name: float(spearmanr(left_m, values).statistic) for name, values in known.items()}
+
+
+def judged(correction: RangeCorrection, test: Test) -> CorrectedRanges:
     """Ranges as the node corrects them."""
-    return correction.correct(test.pairs.measured_m, test.pairs.receive_power_dbm, test.nlos_probability).range_m
+    return correction.correct(test.pairs.measured_m, test.pairs.receive_power_dbm, test.nlos_probability)
+
+
+def within_two_sd(correction: RangeCorrection, test: Test, *, nlos: bool) -> float:
+    """Share of ranges whose error is within twice the standard deviation that the node gives them."""
+    found = judged(correction, test)
+    off = (found.range_m - test.pairs.true_m) ** 2 / (DRIVER_SD_M**2 + found.added_variance_m2)
+    return float(np.mean(off[test.pairs.nlos == nlos] <= 4.0))
 
 
 def simulated(scene: Scene, judge: Judge) -> dict[str, Any]:
@@ -139,9 +163,9 @@ def simulated(scene: Scene, judge: Judge) -> dict[str, Any]:
         "after_polynomial_least_squares_m": [error_m(t, corrected_m(squares, t.pairs), nlos=True) for t in tests],
         "after_polynomial_m": [error_m(test, corrected_m(alone, test.pairs), nlos=True) for test in tests],
         "after_known_nlos_m": [error_m(test, corrected_m(full, test.pairs), nlos=True) for test in tests],
-        "after_m": [error_m(test, judged_m(full, test), nlos=True) for test in tests],
+        "after_m": [error_m(test, judged(full, test).range_m, nlos=True) for test in tests],
         "clear_before_m": [error_m(test, test.pairs.measured_m, nlos=False) for test in tests],
-        "clear_after_m": [error_m(test, judged_m(full, test), nlos=False) for test in tests],
+        "clear_after_m": [error_m(test, judged(full, test).range_m, nlos=False) for test in tests],
     }
     assert full.nlos is not None
     missed = [float(np.mean(test.nlos_probability[test.pairs.nlos] < 0.5)) for test in tests]
@@ -149,6 +173,9 @@ def simulated(scene: Scene, judge: Judge) -> dict[str, Any]:
         **{name: over_tests(values) for name, values in rows.items()},
         "tests": [dict(zip(rows, values, strict=True)) for values in zip(*rows.values(), strict=True)],
         "nlos_missed": over_tests(missed),
+        "nlos_within_two_sd": over_tests([within_two_sd(full, test, nlos=True) for test in tests]),
+        "clear_within_two_sd": over_tests([within_two_sd(full, test, nlos=False) for test in tests]),
+        "left_error_rank_correlation": unexplained(full, tests),
         "degree": full.nlos.degree,
         "power_bias": full.power_bias.kind,
         "antenna_offset_m": full.antenna_offset_m,
