@@ -237,7 +237,7 @@ def run(judge: Judge = power_rule) -> dict[str, Any]:
         "harder_bend": simulated(bend_scene(), judge),
         "paper": {"before_m": 1.37, "after_m": 0.78},
         "note": "1.37 m before is more than buildings show (0.23 to 1.04 m): the scene is made for it by one knob, the "
-        "machine's width, fitted on other seeds to the error before only; that places keep off the machine was set knowing "
+        "machine's width, fitted on other seeds to the error before; that places keep off it was set knowing "
         "what it does to the error after (docs/range-correction.md), so read it beside the harder rows.",
     }
     figures: dict[str, Any] = {"paper_a_range_correction": table}
