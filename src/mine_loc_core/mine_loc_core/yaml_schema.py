@@ -39,7 +39,7 @@ _UNITS = {
 
 
 def read_schema(name: str) -> dict[str, Any]:
-    """A published schema: `name` is "site" or "people"."""
+    """A published schema: `name` is the word before `.schema.json`."""
     text = (resources.files("mine_loc_core") / "schema" / f"{name}.schema.json").read_text("utf-8")
     schema: dict[str, Any] = json.loads(text)
     return schema

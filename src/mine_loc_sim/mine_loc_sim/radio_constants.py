@@ -11,6 +11,8 @@ P2040 ITU-R P.2040, table of building materials (real permittivity; conductivity
 
 from dataclasses import dataclass
 
+from mine_loc_uwb.ranging import LIGHT_IN_AIR_M_PER_S
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelParameters:
@@ -55,8 +57,7 @@ CM4 = ChannelParameters(
 # Transmitter and propagation
 TRANSMIT_POWER_DBM = -14.3
 """-41.3 dBm/MHz over 499.2 MHz: the legal limit, no antenna gain."""
-LIGHT_M_PER_S = 299_702_547.0
-"""In air, as Decawave uses it (UM)."""
+LIGHT_M_PER_S = LIGHT_IN_AIR_M_PER_S
 CARRIER_WAVELENGTH_M = 0.075
 """Channel 2, 3993.6 MHz (UM): the channel of cirs."""
 
@@ -108,10 +109,6 @@ SENSITIVITY_SOFTNESS_DB = 1.0
 EARLY_FALSE_PATH_PROBABILITY = 0.005
 EARLY_FALSE_PATH_MEAN_M = 4.0
 """Isolated outliers 0.5 to 1 % recommended by D.1; that they are early, and -4 m: Qorvo forum thread 2943."""
-
-RANGE_BIAS_LEVEL_DBM = (-95, -93, -91, -89, -87, -85, -83, -81, -79, -77, -75, -73, -71, -69, -67, -65, -63, -61)
-RANGE_BIAS_MM = (86, 81, 76, 71, 62, 49, 42, 35, 21, 0, -27, -51, -69, -82, -93, -100, -105, -110)
-"""Reported minus true range by received level, 500 MHz channels, PRF 64 MHz (APS table 2)."""
 
 # Links
 SLOW_BIAS_SD_M = 0.05

@@ -9,15 +9,16 @@ from mine_loc_sim import radio_constants as constants
 from mine_loc_sim.channel_15_4a import FINE_PER_TAP
 from mine_loc_sim.dw1000_accumulator import Receiver, accumulate, band_limit, taps_to_m
 from mine_loc_sim.leading_edge import read_registers
+from mine_loc_uwb.power_bias import aps011
 
+_CHANNEL_2 = aps011(bandwidth_mhz=500, prf_mhz=64)
 _PHASES = 512
 _CALIBRATION_LEVEL_DBM = -80.0
 
 
 def level_bias_m(level_dbm: NDArray[np.float64]) -> NDArray[np.float64]:
     """Reported minus true range [m] by true received level, any shape; held beyond the table's ends."""
-    millimetres = np.interp(level_dbm, constants.RANGE_BIAS_LEVEL_DBM, constants.RANGE_BIAS_MM)
-    return np.asarray(1e-3 * millimetres)
+    return _CHANNEL_2.at_level_m(level_dbm)
 
 
 @cache

@@ -13,6 +13,9 @@ import numpy.typing as npt
 DW1000_TAP_S = 1.0 / (2 * 499.2e6)
 """Sample period of the DW1000 accumulator, 1.0016 ns (DW1000 User Manual, register file 0x25)."""
 
+LIGHT_IN_AIR_M_PER_S = 299_702_547.0
+"""As Decawave uses it (DW1000 User Manual)."""
+
 DW1000_MAX_TAPS = 1016
 """Accumulator length at PRF 64 MHz; 992 at 16 MHz."""
 

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import isnan, log10, nan, sqrt
 
+import numpy as np
+import numpy.typing as npt
+
 _A_DB = {16: 113.77, 64: 121.74}
 """The constant A of section 4.7.1 by PRF. Version 2.05 prints 115.72 for PRF 16 in 4.7.2; later versions correct it."""
 
@@ -96,9 +99,9 @@ def powers_dbm(reception: Reception) -> tuple[float, float]:
     )
 
 
-def uncompress_dbm(power_dbm: float, prf_mhz: int) -> float:
-    """Undo the saturation of the power estimate above -88 dBm, as thotro/arduino-dw1000 does."""
-    excess_db = max(power_dbm - _COMPRESSION_START_DBM, 0.0)
+def uncompress_dbm(power_dbm: npt.NDArray[np.float64], prf_mhz: int) -> npt.NDArray[np.float64]:
+    """Undo the saturation of the power estimate above -88 dBm, as thotro/arduino-dw1000 does; any shape, NaN stays."""
+    excess_db = np.maximum(power_dbm - _COMPRESSION_START_DBM, 0.0)
     return power_dbm + excess_db * _COMPRESSION_SLOPE[prf_mhz]
 
 
