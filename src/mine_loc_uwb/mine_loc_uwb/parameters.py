@@ -35,6 +35,9 @@ class UwbSolverParameters(NodeParameters):
         "whose anchors: map, or the id of a vehicle that carries them; empty = the map's if it has any",
         read_only=True,
     )
+    range_correction: str = parameter(
+        "", "file of `mine-loc fit-ranges`; a relative path starts at the site's folder; empty = none", read_only=True
+    )
     max_range_m: float = parameter(300.0, "longer ranges are impossible", unit="m", low=1.0, high=1000.0)
     arrival_sd_m: float = parameter(0.15, "standard deviation of a blink's arrivals", unit="m", low=0.001, high=10.0)
     max_gdop: float = parameter(10.0, "geometry beyond it is degenerate", unit="1", low=1.0, high=1000.0)

@@ -14,12 +14,14 @@ from mine_loc_uwb.fix import Fix, FixStatus, no_fix
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.parameters import UwbSolverParameters
 from mine_loc_uwb.range_checks import RepeatedValues, impossible, stamp_reason
+from mine_loc_uwb.range_correction import RangeCorrection
 from mine_loc_uwb.received_power import odds_of_power_rule
 from mine_loc_uwb.solver import Solution, Solver
 from mine_loc_uwb.solvers import RANGE_SOLVERS, TDOA_SOLVERS
 
 _MOST_TAGS = 4096
 _DEFAULT_VARIANCE_M2 = 0.1**2
+_LEAST_RANGE_M = 1e-3
 _LINK_STATE_HOLDS_NS = NS_PER_S
 """A walker passes what obstructs a link in about this time."""
 
@@ -49,10 +51,16 @@ class _Tag:
 class RoundSolver:
     """Solves rounds and blinks of any number of tags against one anchor map."""
 
-    def __init__(self, anchors: Iterable[Anchor], parameters: UwbSolverParameters) -> None:
+    def __init__(
+        self,
+        anchors: Iterable[Anchor],
+        parameters: UwbSolverParameters,
+        correction: RangeCorrection | None = None,
+    ) -> None:
         self.anchors: Mapping[int, Anchor] = {anchor.id: anchor for anchor in anchors}
         self.disabled: set[int] = set()
         self._parameters = parameters
+        self._correction = correction or RangeCorrection()
         self._tags: OrderedDict[tuple[int, Source], _Tag] = OrderedDict()
         self._link_states: dict[int, dict[int, tuple[float, int]]] = {}
 
@@ -164,16 +172,23 @@ class RoundSolver:
         self, tag_id: int, stamp_ns: int, items: Sequence[MeasuredRange], height_m: float | None, source: Source
     ) -> Measurements:
         anchors = [self.anchors[item.anchor_id] for item in items]
-        offsets = [0.0 if source is Source.TDOA else anchor.range_offset_m for anchor in anchors]
+        los_probability = np.array([self._los_probability(tag_id, stamp_ns, item) for item in items], float)
+        power_dbm = np.array([item.receive_power_dbm for item in items], float)
+        range_m = np.array([item.range_m for item in items], float)
+        variance_m2 = np.array([_variance(item, anchor) for item, anchor in zip(items, anchors, strict=True)], float)
+        if source is Source.RANGE:
+            offset_m = np.array([anchor.range_offset_m for anchor in anchors], float)
+            found = self._correction.correct(range_m, power_dbm, 1.0 - los_probability, offset_m)
+            range_m, variance_m2 = np.maximum(found.range_m, _LEAST_RANGE_M), variance_m2 + found.added_variance_m2
         return Measurements(
             stamp_ns=stamp_ns,
             anchor_ids=np.array([item.anchor_id for item in items], np.uint64),
             anchors_m=np.array([anchor.position_m for anchor in anchors]).reshape(-1, 3),
-            range_m=np.array([item.range_m - offset for item, offset in zip(items, offsets, strict=True)], float),
-            variance_m2=np.array([_variance(item, anchor) for item, anchor in zip(items, anchors, strict=True)], float),
-            since_s=np.array([item.since_ns / NS_PER_S for item in items], float),
-            los_probability=np.array([self._los_probability(tag_id, stamp_ns, item) for item in items], float),
-            receive_power_dbm=np.array([item.receive_power_dbm for item in items], float),
+            range_m=range_m,
+            variance_m2=variance_m2,
+            since_s=np.array([item.since_ns / NS_PER_S for item in items], float) - self._correction.stamp_latency_s,
+            los_probability=los_probability,
+            receive_power_dbm=power_dbm,
             height_m=height_m,
             shared_offset=source is Source.TDOA,
         )

@@ -29,6 +29,7 @@ from mine_loc_uwb.anchor_frame import anchor_frame
 from mine_loc_uwb.fix import Fix, FixStatus
 from mine_loc_uwb.nodes.solver_messages import measured_arrivals, measured_ranges, to_pose
 from mine_loc_uwb.parameters import UwbSolverParameters
+from mine_loc_uwb.range_correction_file import load_range_correction
 from mine_loc_uwb.round_solver import RoundSolver, rehearse
 
 _PERIOD_S = 1.0
@@ -44,12 +45,14 @@ class UwbSolver(NodeBase):
         super().__init__("uwb_solver")
 
     def configure(self) -> None:
-        """Load site and people; a bad file refuses the transition."""
+        """Load site, people and range correction; a bad file refuses the transition."""
         folder = Path(self.parameters.site)
         self._site = load_site(folder)
         self._frame = anchor_frame(self._site, self.parameters.frame)
         self._people = PeopleFile(folder)
-        self._solver = RoundSolver(self._frame.anchors, self.parameters)
+        chosen = self.parameters.range_correction
+        correction = load_range_correction(folder / chosen) if chosen else None
+        self._solver = RoundSolver(self._frame.anchors, self.parameters, correction)
         self._poses = self.publish_to(UwbPose, "uwb/pose", EVENTS)
         self._verdicts = self.publish_to(MeasurementVerdictArray, "uwb/verdicts", EVENTS)
         self._map = self.publish_to(AnchorMap, "uwb/anchors", LATCHED)
