@@ -7,13 +7,12 @@ latency of the stamps, settings of the solvers) is found on the other three. The
 """
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hanyang import RUNS, folder, timed_ranges
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from uwb_solver_grid import candidates
@@ -22,13 +21,6 @@ from uwb_tracks import Array, MakeSolver, Track, measurements_of, run_solver
 from mine_loc_core.alignment import truth_at
 from mine_loc_uwb.measurements import Measurements
 
-FOLDERS = {
-    "LOS_A1": "LOS/Trajectory_A/Case_1",
-    "LOS_B3": "LOS/Trajectory_B/Case_3",
-    "NLOS_A1": "NLOS/Trajectory_A/Case_1",
-    "NLOS_B3": "NLOS/Trajectory_B/Case_3",
-}
-ANCHOR_IDS = (3, 5, 9, 12)
 GIVEN_SD_M = 0.08
 PUBLISHED_RMSE_M = {
     "LOS_A1": {"authors_ls": 1.04, "authors_eskf": 1.12},
@@ -50,8 +42,8 @@ class Recorded:
     range_m: Array
     truth_times_s: Array
     truth_m: Array
-    others: Mapping[str, tuple[Array, Array]]
-    """The authors' tracks: times and positions (m, 2)."""
+    authors: Mapping[str, tuple[Array, Array]]
+    """Their tracks: times and positions (m, 2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,22 +62,21 @@ class Constants:
 
 def read(run: str) -> Recorded:
     """One run."""
-    folder = Path(os.environ["MINE_LOC_DATA"], "hanyang_outdoor_uwb", "Dynamic_measurements", FOLDERS[run])
-    truth = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)
-    start_ns = int(truth[0, 0])
-    tables = [
-        np.loadtxt(folder / f"A{number}.csv", delimiter=",", skiprows=1, usecols=range(1, 7)) for number in ANCHOR_IDS
-    ]
-    rows = np.concatenate([np.column_stack([table, np.full(len(table), i)]) for i, table in enumerate(tables)])
-    rows = rows[np.argsort(rows[:, 0], kind="stable")]
-    others = {}
+    ranges = timed_ranges(run)
+    order, start_ns = np.argsort(ranges.stamp_ns, kind="stable"), int(ranges.track_ns[0])
+    authors = {}
     for name, file in (("authors_ls", "LS.csv"), ("authors_eskf", "ESKF.csv")):
-        track = np.loadtxt(folder / file, delimiter=",", skiprows=1)
-        others[name] = (track[:, 0] - start_ns) * _NS, track[:, 1:3]
+        track = np.loadtxt(folder() / "Dynamic_measurements" / RUNS[run] / file, delimiter=",", skiprows=1)
+        authors[name] = (track[:, 0] - start_ns) * _NS, track[:, 1:3]
     return Recorded(
-        (rows[:, 0] - start_ns) * _NS, rows[:, 6].astype(int), rows[:, 2:5], rows[:, 5],
-        (truth[:, 0] - start_ns) * _NS, truth[:, 1:3], others,
-    )  # fmt: skip
+        (ranges.stamp_ns[order] - start_ns) * _NS,
+        ranges.anchor[order],
+        ranges.anchor_m[order],
+        ranges.range_m[order],
+        (ranges.track_ns - start_ns) * _NS,
+        ranges.track_m[:, :2],
+        authors,
+    )
 
 
 def calibrate(runs: Sequence[Recorded]) -> Constants:
@@ -161,20 +152,20 @@ def _errors(run: Recorded, track: Track) -> Array:
 
 def run() -> dict[str, Any]:
     """All solvers on all runs, settings and constants from the other three."""
-    recorded = {name: read(name) for name in FOLDERS}
-    constants = {name: calibrate([recorded[other] for other in FOLDERS if other != name]) for name in FOLDERS}
-    rounds = {name: rounds_of(recorded[name], constants[name]) for name in FOLDERS}
-    figures: dict[str, Any] = {name: {} for name in FOLDERS}
+    recorded = {name: read(name) for name in RUNS}
+    constants = {name: calibrate([recorded[other] for other in RUNS if other != name]) for name in RUNS}
+    rounds = {name: rounds_of(recorded[name], constants[name]) for name in RUNS}
+    figures: dict[str, Any] = {name: {} for name in RUNS}
     for solver, makers in candidates().items():
         scores = {
-            setting: {name: score(make, recorded[name], rounds[name]) for name in FOLDERS}
+            setting: {name: score(make, recorded[name], rounds[name]) for name in RUNS}
             for setting, make in makers.items()
         }
-        for name in FOLDERS:
-            best = min(scores, key=lambda setting: sum(scores[setting][o]["rmse_2d_m"] for o in FOLDERS if o != name))
+        for name in RUNS:
+            best = min(scores, key=lambda setting: sum(scores[setting][o]["rmse_2d_m"] for o in RUNS if o != name))
             figures[name][solver] = scores[best][name] | {"chosen_on_the_others": best}
     for name, one in recorded.items():
-        for author, (times_s, positions_m) in one.others.items():
+        for author, (times_s, positions_m) in one.authors.items():
             own, shifted = (rmse_m(one, times_s - late_s, positions_m) for late_s in (0.0, constants[name].latency_s))
             published = PUBLISHED_RMSE_M[name][author]
             figures[name][author] = {"rmse_2d_m": min(own, shifted), "published_rmse_2d_m": published}
@@ -186,7 +177,7 @@ def run() -> dict[str, Any]:
         }
     rows = [row for row in figures["LOS_A1"] if row != "constants"]
     figures["mean_rmse_2d_m"] = {
-        row: float(np.mean([figures[name][row]["rmse_2d_m"] for name in FOLDERS])) for row in rows
+        row: float(np.mean([figures[name][row]["rmse_2d_m"] for name in RUNS])) for row in rows
     }
     return figures
 
