@@ -28,7 +28,7 @@ GIVEN_SD_M = 0.08
 
 
 def calibrate(run: LabRun) -> tuple[Array, float]:
-    """Offset of each anchor [m] and height of the anchors over the tag [m], found together with where the truth lies."""
+    """Offset of each anchor [m] and height of the anchors over the tag [m], found with where the truth lies."""
     times_s = run.ms / 1e3
 
     def residual(p: Array) -> Array:
