@@ -1,10 +1,9 @@
 """Paper D's setting: blinks of one tag on a straight walk, heard by three anchors through CM7 or CM8.
 
-Every reception goes through the simulator's full chain: channel response, accumulator, leading edge, registers. In `cm7`
-that is the clear channel of INDUSTRIAL. In `cm8` the clear channel itself is CM8, so that every link is the standard's
+Every reception goes through the simulator's full chain: channel response, accumulator, leading edge, registers. `cm7`
+is the clear channel of INDUSTRIAL. In `cm8` the clear channel itself is CM8, so that every link is the standard's
 industrial channel without line of sight, at all places and times: paper D's own special case, harsher than a gallery,
-where some anchor is usually in sight. Nobody's body is in the way. Arrivals are those of `tdoa_blink`: the ranges of the
-links with each anchor's clock error on top and the reference's taken off.
+where some anchor is usually in sight. Nobody's body is in the way. Time differences are those of `tdoa_blink`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -47,6 +46,8 @@ class Walk:
     blinks: Sequence[Measurements]
     truth_m: Reals
     anchors_m: Reals
+    late_m: Reals  # (n, anchors), truth: how late each arrival is, NaN = not heard
+    level_dbm: Reals  # (n, anchors), uncompressed
 
 
 def paper_d_runs(scene: Scene, channel: Channel, seed: int) -> Walk:
@@ -60,7 +61,11 @@ def paper_d_runs(scene: Scene, channel: Channel, seed: int) -> Walk:
     table = np.load(path, allow_pickle=False)
     ids = np.array([anchor.id for anchor in site.anchors], np.uint64)
     blinks = [_blink(number, row, ids, anchors_m, site.tag_height_m) for number, row in enumerate(table)]
-    return Walk(blinks, table[:, 0, :3], anchors_m)
+    late_m = table[..., 3] + table[..., 6] - np.linalg.norm(table[..., :3] - anchors_m, axis=2)
+    level_dbm = np.full(late_m.shape, np.nan)
+    for number, blink in enumerate(blinks):
+        level_dbm[number, np.isin(ids, blink.anchor_ids)] = blink.receive_power_dbm
+    return Walk(blinks, table[:, 0, :3], anchors_m, late_m, level_dbm)
 
 
 def walks(scene: Scene, channel: Channel, seeds: range) -> Iterator[Walk]:
@@ -70,7 +75,7 @@ def walks(scene: Scene, channel: Channel, seeds: range) -> Iterator[Walk]:
 
 
 def _blink(number: int, row: Reals, ids: NDArray[np.uint64], anchors_m: Reals, height_m: float) -> Measurements:
-    """Measurements of one blink from its row (anchors, 6): truth, range, received and first-path level."""
+    """Measurements of one blink from its row (anchors, 7): see `_simulate`."""
     heard = np.isfinite(row[:, 3])
     count = int(heard.sum())
     levels = zip(row[heard, 5].tolist(), row[heard, 4].tolist(), strict=True)
@@ -78,7 +83,7 @@ def _blink(number: int, row: Reals, ids: NDArray[np.uint64], anchors_m: Reals, h
         stamp_ns=number * (1_000_000_000 // RATE_HZ),
         anchor_ids=ids[heard],
         anchors_m=anchors_m[heard],
-        range_m=row[heard, 3] - row[heard, 3][:1].sum(),
+        range_m=range_differences(row[heard, 3], row[heard, 6], 0) if count else np.empty(0),
         variance_m2=np.full(count, WHITE_SD_M**2),
         since_s=np.zeros(count),
         los_probability=np.array([los_probability_from_powers(*pair) for pair in levels]),
@@ -89,7 +94,7 @@ def _blink(number: int, row: Reals, ids: NDArray[np.uint64], anchors_m: Reals, h
 
 
 def _simulate(site: Site, anchors_m: Reals, scene: Scene, channel: Channel, seed: int) -> Reals:
-    """Table (blinks, anchors, 6): truth x y z, arrival as a way, reported level, reported first-path level."""
+    """Table (blinks, anchors, 7): truth x y z, range, level reported and of the first path, clock error as a way."""
     rng = np.random.default_rng([seed, SCENES.index(scene), int(channel[-1])])
     truth_m = _line(scene, site.tag_height_m, rng)
     count = len(anchors_m)
@@ -102,7 +107,7 @@ def _simulate(site: Site, anchors_m: Reals, scene: Scene, channel: Channel, seed
         ways = mine.look(np.repeat(tag_m, count, axis=0), np.tile(anchors_m, (rounds, 1)))
         ranges = _measure(links, tag_m, anchors_m, ways)
         sync_m = np.array([sync.advance(1.0 / RATE_HZ) for _ in range(rounds)])
-        columns = [ranges[0] + sync_m, ranges[1], ranges[2]]
+        columns = [*ranges, sync_m]
         truth = np.broadcast_to(tag_m[:, None], (rounds, count, 3))
         tables.append(np.concatenate([truth, np.stack(columns, axis=2)], axis=2))
     return np.concatenate(tables)
