@@ -5,13 +5,16 @@ Their measurement is the vector of time differences to the first node heard and 
 
 from collections.abc import Callable
 from datetime import datetime, timedelta
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from stonesoup.base import Property
 from stonesoup.models.measurement.nonlinear import NonLinearGaussianMeasurement
 from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantAcceleration
 from stonesoup.predictor.kalman import ExtendedKalmanPredictor
+from stonesoup.types.array import StateVector, StateVectors
 from stonesoup.types.detection import Detection
 from stonesoup.types.hypothesis import SingleHypothesis
 from stonesoup.types.state import GaussianState
@@ -105,18 +108,16 @@ def filterpy_ukf(fix: Fix, parameters: EkfParameters) -> Update:
 class _Blinks(NonLinearGaussianMeasurement):  # type: ignore[misc]
     """Stone Soup's form of one blink; its state is (x, vx, ax, y, vy, ay)."""
 
-    def __init__(self, parameters: EkfParameters, blink: Measurements, noise: Reals) -> None:
-        super().__init__(6, (0, 3), noise)
-        self._parameters, self._blink = parameters, blink
+    expected: Callable[[Reals], Reals] = Property(doc="Measurement expected at a place (2,)")
 
     @property
     def ndim_meas(self) -> int:
-        return 2 * len(self._blink) - 1
+        return len(self.noise_covar)
 
     def function(self, state, noise=False, **_):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN003, ANN202, ARG002, FBT002
         places = np.asarray(state.state_vector, float)[[0, 3]].reshape(2, -1)
-        columns = [_expected(self._parameters, self._blink, place) for place in places.T]
-        return np.array(columns).T
+        columns = np.array([self.expected(place) for place in places.T]).T
+        return StateVector(columns) if columns.shape[1] == 1 else StateVectors(columns)
 
     def rvs(self, *_args, **_kwargs):  # type: ignore[no-untyped-def] # noqa: ANN002, ANN003, ANN202
         raise NotImplementedError
@@ -137,7 +138,11 @@ def stonesoup_ekf(fix: Fix, parameters: EkfParameters) -> Update:
         predicted = predictor.predict(state, timestamp=now)
         if len(blink):
             z, noise = _measured(parameters, blink)
-            detection = Detection(z[:, None], timestamp=now, measurement_model=_Blinks(parameters, blink, noise))
+            detection = Detection(
+                z[:, None],
+                timestamp=now,
+                measurement_model=_Blinks(6, (0, 3), noise, expected=partial(_expected, parameters, blink)),
+            )
             state = updater.update(SingleHypothesis(predicted, detection))
         else:
             state = GaussianState(predicted.state_vector, predicted.covar, timestamp=now)

@@ -31,7 +31,6 @@ Channel = Literal["cm7", "cm8"]
 SCENES: tuple[Scene, ...] = ("triangle", "gallery")
 ENVIRONMENTS: dict[str, Environment] = {"cm7": INDUSTRIAL, "cm8": Environment(CM8, CM8)}
 HERE = Path(__file__).parent
-CACHE = HERE.parent / "build" / "uwb_paper_d"
 SPEED_M_PER_S, RATE_HZ, SECONDS = 1.0, 20, 12
 WHITE_SD_M = 0.03
 """White noise that arrivals claim: what a link at rest shows (hardware table D.1); neither channel is in it."""
@@ -50,15 +49,12 @@ class Walk:
     level_dbm: Reals  # (n, anchors), uncompressed
 
 
+@cache
 def paper_d_runs(scene: Scene, channel: Channel, seed: int) -> Walk:
-    """Blinks of one walk; kept under build/ and made anew where they are not, the same for the same arguments."""
-    path = CACHE / f"{scene}_{channel}_{seed}.npy"
+    """Blinks of one walk, the same for the same arguments; some tenths of a second to make."""
     site = load_site(HERE / "uwb_scenes" / scene)
     anchors_m = np.array([anchor.position_m for anchor in site.anchors])
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        np.save(path, _simulate(site, anchors_m, scene, channel, seed), allow_pickle=False)
-    table = np.load(path, allow_pickle=False)
+    table = _simulate(site, anchors_m, scene, channel, seed)
     ids = np.array([anchor.id for anchor in site.anchors], np.uint64)
     blinks = [_blink(number, row, ids, anchors_m, site.tag_height_m) for number, row in enumerate(table)]
     late_m = table[..., 3] + table[..., 6] - np.linalg.norm(table[..., :3] - anchors_m, axis=2)
