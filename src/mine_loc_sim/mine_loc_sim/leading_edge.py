@@ -59,7 +59,8 @@ def first_path_index(magnitude: NDArray[np.float32], level: NDArray[np.float64])
     last_below = window.shape[1] - 1 - below[:, ::-1].argmax(axis=1)
     foot = np.where(below.any(axis=1), last_below, top - 1)
     low, high = window[rows, foot], window[rows, foot + 1]
-    edge = foot + (half - low) / np.where(high > low, high - low, 1.0)
+    # Where the search starts inside a response nothing before it is below half: the edge is then the sample itself.
+    edge = foot + np.clip((half - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
     index = np.round((crossing - _BEFORE + edge) * 64.0) / 64.0
     return np.where(found, index, np.nan)
 

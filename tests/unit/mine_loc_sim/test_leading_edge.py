@@ -10,6 +10,7 @@ import pytest
 from mine_loc_sim.channel_15_4a import FINE_PER_TAP
 from mine_loc_sim.dw1000_accumulator import Receiver, Reception, accumulate, band_limit, reported_level_dbm, taps_to_m
 from mine_loc_sim.leading_edge import first_path_index, noise_std, read_registers, threshold
+from mine_loc_sim.radio_constants import SEARCH_START_TAP
 from mine_loc_sim.range_bias import edge_lead_m, level_bias_m
 
 COUNT = 200
@@ -133,3 +134,9 @@ def test_reported_level_is_true_below_the_knee_compressed_above_and_has_a_ceilin
 
 def test_range_bias_is_the_application_notes():
     assert level_bias_m(np.array([-80.0, -61.0, -50.0, -120.0])) == pytest.approx([0.028, -0.110, -0.110, 0.086])
+
+
+def test_a_search_that_starts_inside_a_response_stays_where_it_starts():
+    magnitude = (1000.0 + 0.01 * np.arange(1016, dtype=np.float32))[None]
+    index = first_path_index(magnitude, np.array([300.0]))
+    assert SEARCH_START_TAP - 1 <= index[0] <= SEARCH_START_TAP + 10
