@@ -19,7 +19,9 @@ from mine_loc_uwb import tracker_kernel as kernel
 from mine_loc_uwb.consensus_fix import Consensus, consensus_fix
 from mine_loc_uwb.fix import Array, Fix, FixStatus, no_fix
 from mine_loc_uwb.measurements import Measurements
+from mine_loc_uwb.path_loss import PathLoss
 from mine_loc_uwb.solver import Solution
+from mine_loc_uwb.tdoa_rss import TdoaRssParameters, solve_blink
 
 Ids = npt.NDArray[np.uint64]
 Slots = npt.NDArray[np.int64]
@@ -45,10 +47,14 @@ class RobustTrackerSettings:
     """Of all links of a tag: its own antenna delay."""
     nlos_scale_m: float = 0.6
     """Mean excess of an obstructed link; 0.3 to 0.9 m were measured in buildings (hardware notes D.1)."""
+    nlos_growth_per_db: float = 0.0
+    """By how much the logarithm of that mean grows as the received level falls below -92 dBm by 1 dB."""
     nlos_time_s: float = 1.0
     """A walker passes what obstructs a link within some such times."""
     nlos_share: float = 0.5
     """Share of links that are obstructed where nothing is known of them."""
+    path_loss: PathLoss | None = None
+    """Levels help to choose where a blink starts a track; None = they do not."""
     top_speed_m_s: float = 3.0
     first_speed_sd_m_s: float = 1.0
     gate: float = 0.9999
@@ -64,11 +70,12 @@ class RobustTrackerSettings:
 
     def noise(self) -> Array:
         """The settings the kernel uses, in its order."""
-        values = np.empty(9)
+        values = np.empty(kernel.SETTINGS)
         values[kernel.ACCELERATION] = self.acceleration_density_m2_s3
         values[kernel.BIAS_SD], values[kernel.BIAS_TIME] = self.bias_sd_m, self.bias_time_s
         values[kernel.COMMON_SD], values[kernel.COMMON_TIME] = self.common_bias_sd_m, self.common_bias_time_s
-        values[kernel.NLOS_SCALE], values[kernel.NLOS_TIME] = self.nlos_scale_m, self.nlos_time_s
+        values[kernel.NLOS_SCALE], values[kernel.NLOS_GROWTH] = self.nlos_scale_m, self.nlos_growth_per_db
+        values[kernel.NLOS_TIME] = self.nlos_time_s
         values[kernel.NLOS_SHARE], values[kernel.TOP_SPEED] = self.nlos_share, self.top_speed_m_s
         return values
 
@@ -99,7 +106,7 @@ class RobustTracker:
         kernel.take_round(
             self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
             measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
-            self._link_nlos, gone_s, _OFFSET_SD_M * measurements.shared_offset, self._gate, self._noise,
+            measurements.receive_power_dbm, self._link_nlos, gone_s, _OFFSET_SD_M * measurements.shared_offset, self._gate, self._noise,
             codes, deviances, quality,
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
@@ -157,6 +164,8 @@ class RobustTracker:
         return Solution(self._fix(measurements, quality), reasons, unknown, self._gate)
 
     def _consensus(self, measurements: Measurements) -> Consensus | None:
+        if measurements.shared_offset:
+            return self._blink_place(measurements)
         sd_m = math.hypot(math.sqrt(float(np.mean(measurements.variance_m2))), self._settings.bias_sd_m)
         return consensus_fix(
             measurements.anchors_m,
@@ -165,6 +174,15 @@ class RobustTracker:
             nlos_scale_m=self._settings.nlos_scale_m,
             height_m=measurements.height_m,
         )
+
+    def _blink_place(self, measurements: Measurements) -> Consensus | None:
+        excess_m = self._settings.nlos_share * self._settings.nlos_scale_m
+        fix, _ = solve_blink(measurements, TdoaRssParameters(self._settings.path_loss, excess_m, max_gdop=math.inf))
+        if fix.status is not FixStatus.OK:
+            return None
+        d = fix.dimensions
+        everyone = np.ones(len(measurements), np.bool_)
+        return Consensus(fix.position_m[:d], fix.covariance_m2[:d, :d], everyone, ambiguous=False)
 
     def _place(self, measurements: Measurements, position_m: Array, covariance_m2: Array) -> None:
         """Begin at a place, at rest, with nothing known of the links."""

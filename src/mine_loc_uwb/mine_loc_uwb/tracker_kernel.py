@@ -17,13 +17,26 @@ from mine_loc_uwb.one_sided_noise import deviance, score
 
 Integers = npt.NDArray[np.int64]
 
-ACCELERATION, BIAS_SD, BIAS_TIME, COMMON_SD, COMMON_TIME, NLOS_SCALE, NLOS_TIME, NLOS_SHARE, TOP_SPEED = range(9)
-"""Places of the settings in the array `noise`."""
+(
+    ACCELERATION,
+    BIAS_SD,
+    BIAS_TIME,
+    COMMON_SD,
+    COMMON_TIME,
+    NLOS_SCALE,
+    NLOS_GROWTH,
+    NLOS_TIME,
+    NLOS_SHARE,
+    TOP_SPEED,
+    SETTINGS,
+) = range(11)
+"""Places of the settings in the array `noise`, and how many they are."""
 
 ACCEPTED, GATE, KINEMATIC = range(3)
 """What became of a range."""
 
 _OUTLIER_DENSITY_PER_M = 2e-4
+_FALLING_FROM_DBM, _MOST_SCALE_M = -92.0, 10.0
 _LEAST_NLOS, _MOST_NLOS = 0.01, 0.97
 _IMPOSSIBLE_SDS = 5.0
 
@@ -78,9 +91,9 @@ def take_range(
     since_s: float,
     height_m: float,
     nlos_probability: float,
+    nlos_scale_m: float,
     reach_m: float,
     gate: float,
-    noise: Array,
     work: Array,
 ) -> tuple[int, float, float]:
     """Update (x, P) by one range; returns what became of it, its deviance and P(NLOS | range).
@@ -108,11 +121,11 @@ def take_range(
     for axis in range(d):
         variance += unit[axis] * (gain[axis] + since_s * gain[d + axis])
     error = range_m - distance - curvature - x[common] - x[bias]
-    distance_sq = deviance(error, variance, nlos_probability, noise[NLOS_SCALE])
+    distance_sq = deviance(error, variance, nlos_probability, nlos_scale_m)
     if distance_sq > gate:
         impossible = error < -(reach_m + _IMPOSSIBLE_SDS * math.sqrt(variance))
         return (KINEMATIC if impossible else GATE), distance_sq, nlos_probability
-    first, second, nlos = score(error, variance, nlos_probability, noise[NLOS_SCALE], _OUTLIER_DENSITY_PER_M)
+    first, second, nlos = score(error, variance, nlos_probability, nlos_scale_m, _OUTLIER_DENSITY_PER_M)
     second = min(max(second, 0.0), 1.0 / variance)
     for i in range(size):
         x[i] += first * gain[i]
@@ -133,6 +146,7 @@ def take_round(
     since_s: Array,
     height_m: float,
     los_probability: Array,
+    level_dbm: Array,
     link_nlos: Array,
     gone_s: float,
     offset_sd_m: float,
@@ -166,7 +180,7 @@ def take_round(
         belief = _shifted(belief, los_probability[number])
         codes[number], deviances[number], link_nlos[slot] = take_range(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
-            height_m, belief, gone_s * noise[TOP_SPEED], gate, noise, work,
+            height_m, belief, _scale_m(level_dbm[number], noise), gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
     _judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
 
@@ -196,6 +210,15 @@ def _judge_round(
     quality[0] = used.sum()
     quality[1] = math.sqrt(squares / quality[0]) if quality[0] > 0.0 else math.nan
     quality[2] = gdop(x[:d], anchors_m, used, height_m)
+
+
+@njit(cache=True)
+def _scale_m(level_dbm: float, noise: Array) -> float:
+    """Mean excess of an obstructed link: the weaker it is, the later its slow edge passes the threshold."""
+    scale_m = noise[NLOS_SCALE]
+    if level_dbm < _FALLING_FROM_DBM:  # false for NaN
+        scale_m *= math.exp(noise[NLOS_GROWTH] * (_FALLING_FROM_DBM - level_dbm))
+    return min(scale_m, _MOST_SCALE_M)
 
 
 @njit(cache=True)
