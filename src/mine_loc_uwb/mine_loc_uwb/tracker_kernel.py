@@ -157,13 +157,14 @@ def take_round(
         first_m = _first_offset(x, dimensions, anchors_m, slots, range_m, height_m, work)
         open_offset(x, P, dimensions, first_m, offset_sd_m)
     memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
+    for slot in range(len(link_nlos)):  # of all links, heard or not
+        link_nlos[slot] = share + memory * (link_nlos[slot] - share)
     todo = np.ones(len(range_m), np.bool_)
     for _ in range(len(range_m)):
         number = _most_credible(x, dimensions, anchors_m, slots, range_m, height_m, todo, work)
         todo[number] = False
         slot = slots[number]
-        belief = share + memory * (link_nlos[slot] - share)
-        belief = _shifted(belief, los_probability[number])
+        belief = _shifted(link_nlos[slot], los_probability[number])
         codes[number], deviances[number], link_nlos[slot] = take_range(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
             height_m, belief, gone_s * noise[TOP_SPEED], gate, noise, work,

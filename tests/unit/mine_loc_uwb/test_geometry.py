@@ -77,7 +77,7 @@ def test_four_anchors_in_the_four_directions_dilute_by_one():
 @pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi / 2])
 def test_gdop_on_the_line_of_all_anchors_is_infinite(yaw):
     along = np.array([math.cos(yaw), math.sin(yaw), 0.0])
-    anchors = np.outer([0.0, 7.0, 13.0, 31.0], along) + [3.0, 4.0, 1.0]
+    anchors = np.outer([0.0, 7.0, 13.0, 31.0], along) + np.array([3.0, 4.0, 1.0])
     assert gdop(20.0 * along[:2] + np.array([3.0, 4.0]), anchors, np.ones(4), 1.0) == math.inf
 
 
