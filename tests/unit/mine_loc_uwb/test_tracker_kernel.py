@@ -54,7 +54,7 @@ def test_prediction_is_that_of_the_continuous_model(seed, dimensions, links, gon
     expected_x, expected_P = F @ x, F @ P @ F.T + Q
     kernel.predict(x, P, dimensions, gone_s, NOISE)
     assert x == pytest.approx(expected_x, rel=1e-9, abs=1e-12)
-    assert P == pytest.approx(expected_P, rel=1e-6, abs=1e-9)
+    assert pytest.approx(expected_P, rel=1e-6, abs=1e-9) == P
 
 
 @settings(max_examples=30, deadline=None)
@@ -63,7 +63,7 @@ def test_prediction_keeps_the_covariance_symmetric_and_positive(seed, dimensions
     x, P = state(seed, dimensions, 3)
     for gone_s in steps_s:
         kernel.predict(x, P, dimensions, gone_s, NOISE)
-    assert P == pytest.approx(P.T, rel=1e-12, abs=1e-15)
+    assert pytest.approx(P.T, rel=1e-12, abs=1e-15) == P
     assert np.linalg.eigvalsh(P)[0] > 0.0
 
 
@@ -105,7 +105,7 @@ def test_a_clear_range_of_a_far_anchor_is_a_textbook_kalman_update(seed, dimensi
     assert code == kernel.ACCEPTED
     assert deviance == pytest.approx(z**2, abs=1e-3)
     assert x == pytest.approx(expected_x, abs=2e-3)
-    assert P == pytest.approx(expected_P, rel=0.02, abs=1e-3)
+    assert pytest.approx(expected_P, rel=0.02, abs=1e-3) == P
 
 
 @settings(max_examples=40, deadline=None)
@@ -135,7 +135,7 @@ def test_a_refused_range_leaves_the_state_as_it_was():
         assert (code, nlos) == (wanted, 0.4)
         assert deviance > gate
         assert (x == before[0]).all()
-        assert (P == before[1]).all()
+        assert (before[1] == P).all()
 
 
 def test_a_range_believed_obstructed_pulls_less_than_one_believed_clear():
