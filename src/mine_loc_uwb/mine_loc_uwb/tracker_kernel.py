@@ -169,11 +169,11 @@ def take_round(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
             height_m, belief, gone_s * noise[TOP_SPEED], gate, noise, work,
         )  # fmt: skip
-    _judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
+    judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
 
 
 @njit(cache=True)
-def _judge_round(
+def judge_round(
     x: Array,
     dimensions: int,
     anchors_m: Array,
@@ -184,6 +184,7 @@ def _judge_round(
     codes: Integers,
     quality: Array,
 ) -> None:
+    """Leave in `quality` (3,) what `take_round` does, of the ranges that `codes` (n,) says were accepted."""
     d = dimensions
     at, unit, used, squares = np.empty(d), np.empty(d), np.zeros(len(range_m)), 0.0
     for number in range(len(range_m)):
