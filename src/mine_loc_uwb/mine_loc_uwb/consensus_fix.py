@@ -16,7 +16,7 @@ from mine_loc_uwb.geometry import inverse_information
 from mine_loc_uwb.weighted_lm import weighted_lm
 
 _DIRECTIONS = 8
-_REWEIGHTINGS = 3
+_REWEIGHTINGS = 6
 _AS_GOOD = 6.0  # more deviance than this makes a minimum a worse explanation
 _SAME_PLACE_SDS = 4.0
 

@@ -10,7 +10,8 @@ from numba import njit
 
 _ROOT_2 = math.sqrt(2.0)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
-_FARTHEST = 26.0  # erfc is 0 beyond it
+_ROOT_PI = math.sqrt(math.pi)
+_FARTHEST = 26.0  # erfc underflows beyond it
 
 
 @njit(cache=True)
@@ -23,8 +24,10 @@ def normal_density(error_m: float, variance_m2: float) -> float:
 def excess_density(error_m: float, variance_m2: float, scale_m: float) -> float:
     """Density [1/m] of a Gaussian of this variance plus an exponential excess of mean `scale_m`."""
     argument = (variance_m2 / scale_m - error_m) / math.sqrt(2.0 * variance_m2)
-    if argument > _FARTHEST:
-        return 0.0
+    if argument > _FARTHEST:  # a spread of many scales: the asymptotic series of erfc
+        inverse_sq = 1.0 / (argument * argument)
+        series = (1.0 - 0.5 * inverse_sq + 0.75 * inverse_sq * inverse_sq) / (_ROOT_PI * argument)
+        return 0.5 / scale_m * math.exp(-0.5 * error_m * error_m / variance_m2) * series
     exponent = variance_m2 / (2.0 * scale_m * scale_m) - error_m / scale_m
     return 0.5 / scale_m * math.exp(exponent) * math.erfc(argument)
 
@@ -53,9 +56,12 @@ def score(
 
 @njit(cache=True)
 def deviance(error_m: float, variance_m2: float, nlos_probability: float, scale_m: float) -> float:
-    """2 ln(f(0) / f(error)): the squared Mahalanobis distance where p = 0, and its like under the one-sided law."""
+    """2 ln(f(0) / f(error)): the squared Mahalanobis distance where p = 0, and its like under the one-sided law.
+
+    0 for errors that are likelier than none, as those are that an obstruction explains best.
+    """
     p, spread = nlos_probability, math.sqrt(variance_m2)
     at_zero = (1.0 - p) / (_ROOT_2_PI * spread) + p * excess_density(0.0, variance_m2, scale_m)
     here = (1.0 - p) * math.exp(-0.5 * error_m * error_m / variance_m2) / (_ROOT_2_PI * spread)
     here += p * excess_density(error_m, variance_m2, scale_m)
-    return 2.0 * math.log(at_zero / here) if here > 0.0 else math.inf
+    return max(2.0 * math.log(at_zero / here), 0.0) if here > 0.0 else math.inf

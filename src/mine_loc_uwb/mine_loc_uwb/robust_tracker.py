@@ -3,11 +3,12 @@
 What a range may be wrong by is modelled, not cut off: white noise, a bias of each link and of the tag that changes
 slowly, and an excess when the link is obstructed, believed as far as its own ranges or the classifier say so. A gate
 refuses what even that does not explain. When most ranges are refused for a while, the tracker begins anew where they
-agree, if at least three do and the person can have got there (else a cluster of wrong ranges would capture it).
+agree, if more do than the place has coordinates and the person can have got there (else a cluster of wrong ranges would
+capture it).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,6 @@ from mine_loc_uwb.tdoa_rss import TdoaRssParameters, solve_blink
 Ids = npt.NDArray[np.uint64]
 Slots = npt.NDArray[np.int64]
 _REASON = {kernel.ACCEPTED: Reason.ACCEPTED, kernel.GATE: Reason.GATE, kernel.KINEMATIC: Reason.KINEMATIC}
-_ENOUGH_AGREE = 3
 _MOST_LINKS = 16
 _OFFSET_SD_M = 100.0
 _LONGEST_DOUBT_STEP_S = 0.5
@@ -111,30 +111,38 @@ class RobustTracker:
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
         reasons = tuple([_REASON[code] for code in codes.tolist()])
-        reasons = self._judge_agreement(measurements, reasons, int(quality[0]), gone_s)
-        return Solution(self._fix(measurements, quality), reasons, deviances, self._gate)
+        solution = Solution(self._fix(measurements, quality), reasons, deviances, self._gate)
+        return self._settle_doubt(measurements, solution, gone_s)
 
-    def _judge_agreement(
-        self, measurements: Measurements, reasons: tuple[Reason, ...], accepted: int, gone_s: float
-    ) -> tuple[Reason, ...]:
+    def _settle_doubt(self, measurements: Measurements, solution: Solution, gone_s: float) -> Solution:
         """Doubt grows while most ranges are refused; in the end the tracker begins anew where they agree."""
-        if not reasons:
-            return reasons
-        if 2 * accepted > len(reasons):
+        accepted, count = solution.fix.ranges_used, len(measurements)
+        if count == 0:
+            return solution
+        if 2 * accepted > count:
             self._doubt_s, self._trusted_ns = 0.0, measurements.stamp_ns
-            return reasons
+            return solution
         self._doubt_s += min(gone_s, _LONGEST_DOUBT_STEP_S)
         if self._doubt_s < self._settings.reopen_after_s or measurements.shared_offset:
-            return reasons
-        found = self._consensus(measurements)
-        if found is None or found.ambiguous or found.agreeing.sum() < _ENOUGH_AGREE:
-            return reasons
+            return solution
+        found = self._agreed_place(measurements)
+        if found is None:
+            return solution
         if self._can_be_at(found, measurements.stamp_ns):
-            self._place(measurements, found.position_m, found.covariance_m2)
-            return tuple(Reason.ACCEPTED if agrees else Reason.GATE for agrees in found.agreeing)
-        return tuple(
-            Reason.CAPTURE_GUARD if agrees else reason for agrees, reason in zip(found.agreeing, reasons, strict=True)
+            return self._begin_at(found, measurements)
+        refused = Reason.CAPTURE_GUARD
+        reasons = tuple(
+            refused if agrees and reason is not Reason.ACCEPTED else reason
+            for agrees, reason in zip(found.agreeing, solution.reasons, strict=True)
         )
+        return replace(solution, reasons=reasons)
+
+    def _agreed_place(self, measurements: Measurements) -> Consensus | None:
+        """The one place where more ranges agree than its coordinates need: as many as those always agree somewhere."""
+        found = self._consensus(measurements)
+        if found is None or found.ambiguous or found.agreeing.sum() <= measurements.dimensions:
+            return None
+        return found
 
     def _can_be_at(self, found: Consensus, stamp_ns: int) -> bool:
         """Whether the person can have got there since ranges were last believed, or all have agreed on it for long."""
@@ -142,7 +150,7 @@ class RobustTracker:
         d = len(found.position_m)
         sd_m = math.sqrt(np.trace(self._P[:d, :d]) + np.trace(found.covariance_m2))
         way_m = float(np.linalg.norm(found.position_m - self._x[:d]))
-        unanimous = len(found.agreeing) > _ENOUGH_AGREE and bool(found.agreeing.all())
+        unanimous = len(found.agreeing) > d + 1 and bool(found.agreeing.all())
         return way_m <= self._settings.top_speed_m_s * gone_s + 2.0 * sd_m or (
             unanimous and self._doubt_s >= self._settings.guard_s
         )
@@ -158,10 +166,19 @@ class RobustTracker:
         if found is None or math.sqrt(np.trace(found.covariance_m2)) > self._settings.max_start_sd_m:
             fix = no_fix(FixStatus.DEGENERATE, dimensions, count)
             return Solution(fix, (Reason.DEGENERATE,) * count, unknown, self._gate)
+        return self._begin_at(found, measurements)
+
+    def _begin_at(self, found: Consensus, measurements: Measurements) -> Solution:
+        """Start where ranges agree; of two places that are as good all are believed."""
         self._place(measurements, found.position_m, found.covariance_m2)
-        reasons = tuple(Reason.ACCEPTED if agrees or found.ambiguous else Reason.GATE for agrees in found.agreeing)
-        quality = np.array([sum(reason is Reason.ACCEPTED for reason in reasons), math.nan, math.nan])
-        return Solution(self._fix(measurements, quality), reasons, unknown, self._gate)
+        codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.GATE)
+        quality = np.empty(3)
+        kernel.judge_round(
+            self._x, measurements.dimensions, measurements.anchors_m, self._slots_of(measurements.anchor_ids),
+            measurements.range_m, measurements.since_s, measurements.plane_m, codes, quality,
+        )  # fmt: skip
+        reasons = tuple([_REASON[code] for code in codes.tolist()])
+        return Solution(self._fix(measurements, quality), reasons, np.full(len(codes), math.nan), self._gate)
 
     def _consensus(self, measurements: Measurements) -> Consensus | None:
         if measurements.shared_offset:

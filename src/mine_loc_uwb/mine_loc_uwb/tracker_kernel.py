@@ -171,22 +171,23 @@ def take_round(
         first_m = _first_offset(x, dimensions, anchors_m, slots, range_m, height_m, work)
         open_offset(x, P, dimensions, first_m, offset_sd_m)
     memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
+    for slot in range(len(link_nlos)):  # of all links, heard or not
+        link_nlos[slot] = share + memory * (link_nlos[slot] - share)
     todo = np.ones(len(range_m), np.bool_)
     for _ in range(len(range_m)):
         number = _most_credible(x, dimensions, anchors_m, slots, range_m, height_m, todo, work)
         todo[number] = False
         slot = slots[number]
-        belief = share + memory * (link_nlos[slot] - share)
-        belief = _shifted(belief, los_probability[number])
+        belief = _shifted(link_nlos[slot], los_probability[number])
         codes[number], deviances[number], link_nlos[slot] = take_range(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
             height_m, belief, _scale_m(level_dbm[number], noise), gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
-    _judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
+    judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
 
 
 @njit(cache=True)
-def _judge_round(
+def judge_round(
     x: Array,
     dimensions: int,
     anchors_m: Array,
@@ -197,6 +198,7 @@ def _judge_round(
     codes: Integers,
     quality: Array,
 ) -> None:
+    """Leave in `quality` (3,) what `take_round` does, of the ranges that `codes` (n,) says were accepted."""
     d = dimensions
     at, unit, used, squares = np.empty(d), np.empty(d), np.zeros(len(range_m)), 0.0
     for number in range(len(range_m)):
