@@ -54,7 +54,9 @@ class RobustTrackerSettings:
     nlos_share: float = 0.5
     """Share of links that are obstructed where nothing is known of them."""
     path_loss: PathLoss | None = None
-    """Levels help to choose where a blink starts a track; None = they do not."""
+    """Levels help, above all to choose where a blink starts a track; None = they do not."""
+    level_sd_db: float = 20.0
+    """More than the path loss's shadowing, because that stays for metres."""
     top_speed_m_s: float = 3.0
     first_speed_sd_m_s: float = 1.0
     gate: float = 0.9999
@@ -77,6 +79,10 @@ class RobustTrackerSettings:
         values[kernel.NLOS_SCALE], values[kernel.NLOS_GROWTH] = self.nlos_scale_m, self.nlos_growth_per_db
         values[kernel.NLOS_TIME] = self.nlos_time_s
         values[kernel.NLOS_SHARE], values[kernel.TOP_SPEED] = self.nlos_share, self.top_speed_m_s
+        loss = self.path_loss
+        values[kernel.LEVEL_1M] = loss.level_1m_dbm if loss else math.nan
+        values[kernel.LEVEL_EXPONENT] = loss.exponent if loss else math.nan
+        values[kernel.LEVEL_SD] = self.level_sd_db if loss else 0.0
         return values
 
 

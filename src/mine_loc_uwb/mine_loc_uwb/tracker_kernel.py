@@ -28,14 +28,18 @@ Integers = npt.NDArray[np.int64]
     NLOS_TIME,
     NLOS_SHARE,
     TOP_SPEED,
+    LEVEL_1M,
+    LEVEL_EXPONENT,
+    LEVEL_SD,
     SETTINGS,
-) = range(11)
+) = range(14)
 """Places of the settings in the array `noise`, and how many they are."""
 
 ACCEPTED, GATE, KINEMATIC = range(3)
 """What became of a range."""
 
 _OUTLIER_DENSITY_PER_M = 2e-4
+_DB_PER_E = 10.0 / math.log(10.0)
 _FALLING_FROM_DBM, _MOST_SCALE_M = -92.0, 10.0
 _LEAST_NLOS, _MOST_NLOS = 0.01, 0.97
 _IMPOSSIBLE_SDS = 5.0
@@ -132,6 +136,36 @@ def take_range(
         for j in range(size):
             P[i, j] -= second * gain[i] * gain[j]
     return ACCEPTED, distance_sq, nlos
+
+
+@njit(cache=True)
+def take_level(
+    x: Array,
+    P: Array,
+    dimensions: int,
+    anchor_m: Array,
+    level_dbm: float,
+    height_m: float,
+    noise: Array,
+    work: Array,
+) -> None:
+    """Update (x, P) by the level of one link: log-distance path loss with normal errors [dB] (paper D)."""
+    d, size = dimensions, len(x)
+    unit, gain = work[1], work[2]
+    distance = direction(x[:d], anchor_m, height_m, unit[:d])
+    slope = -_DB_PER_E * noise[LEVEL_EXPONENT] / distance
+    variance = noise[LEVEL_SD] * noise[LEVEL_SD]
+    for i in range(size):
+        gain[i] = 0.0
+        for axis in range(d):
+            gain[i] += slope * unit[axis] * P[i, axis]
+    for axis in range(d):
+        variance += slope * unit[axis] * gain[axis]
+    error = level_dbm - noise[LEVEL_1M] + _DB_PER_E * noise[LEVEL_EXPONENT] * math.log(distance)
+    for i in range(size):
+        x[i] += gain[i] * error / variance
+        for j in range(size):
+            P[i, j] -= gain[i] * gain[j] / variance
 
 
 @njit(cache=True)
