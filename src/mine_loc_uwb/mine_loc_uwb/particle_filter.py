@@ -51,8 +51,6 @@ class ParticleFilterParameters:
     max_gdop: float = 10.0
     particles: int = 1000
     resampling_share: float = 0.5
-    kernel: float = 0.4
-    """Width of the kernel as a share of the particles' spread, within (0, 1)."""
     seed: int = 1
 
 
@@ -222,7 +220,8 @@ class ParticleFilter:
         spread = (self._weights[:, None] * (flat - mean)).T @ (flat - mean)
         positions = (self._rng.random() + np.arange(count)) / count
         chosen = np.minimum(np.searchsorted(np.cumsum(self._weights), positions), count - 1)
-        width = self.parameters.kernel
+        size = flat.shape[1]
+        width = (4.0 / ((size + 2.0) * count)) ** (1.0 / (size + 4.0))  # Silverman's, best for normal spreads
         values, vectors = np.linalg.eigh(spread)
         root = vectors * (width * np.sqrt(np.maximum(values, 0.0)))
         kept = np.sqrt(1.0 - width**2) * (flat[chosen] - mean)
