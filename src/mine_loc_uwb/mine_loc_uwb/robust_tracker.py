@@ -19,6 +19,7 @@ from mine_loc_core.verdicts import Reason
 from mine_loc_uwb import tracker_kernel as kernel
 from mine_loc_uwb.consensus_fix import Consensus, consensus_fix
 from mine_loc_uwb.fix import Array, Fix, FixStatus, no_fix
+from mine_loc_uwb.late_arrival import LateArrival
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.path_loss import PathLoss
 from mine_loc_uwb.solver import Solution
@@ -28,7 +29,6 @@ Ids = npt.NDArray[np.uint64]
 Slots = npt.NDArray[np.int64]
 _REASON = {kernel.ACCEPTED: Reason.ACCEPTED, kernel.GATE: Reason.GATE, kernel.KINEMATIC: Reason.KINEMATIC}
 _MOST_LINKS = 16
-_OFFSET_SD_M = 100.0
 _LONGEST_DOUBT_STEP_S = 0.5
 """A silence is not doubt: one round after it adds no more than this."""
 
@@ -112,7 +112,7 @@ class RobustTracker:
         kernel.take_round(
             self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
             measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
-            measurements.receive_power_dbm, self._link_nlos, gone_s, _OFFSET_SD_M * measurements.shared_offset, self._gate, self._noise,
+            measurements.receive_power_dbm, self._link_nlos, gone_s, int(measurements.shared_offset and len(slots) > 0), self._gate, self._noise,
             codes, deviances, quality,
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
@@ -199,8 +199,11 @@ class RobustTracker:
         )
 
     def _blink_place(self, measurements: Measurements) -> Consensus | None:
-        excess_m = self._settings.nlos_share * self._settings.nlos_scale_m
-        fix, _ = solve_blink(measurements, TdoaRssParameters(self._settings.path_loss, excess_m, max_gdop=math.inf))
+        s = self._settings
+        law = LateArrival(s.nlos_share, s.nlos_scale_m, s.nlos_growth_per_db)
+        weight = min((s.path_loss.shadowing_db / s.level_sd_db) ** 2, 1.0) if s.path_loss else 1.0
+        blink = TdoaRssParameters(s.path_loss, law=law, level_weight=weight, max_gdop=math.inf)
+        fix, _ = solve_blink(measurements, blink)
         if fix.status is not FixStatus.OK:
             return None
         d = fix.dimensions

@@ -40,7 +40,7 @@ ACCEPTED, GATE, KINEMATIC = range(3)
 
 _OUTLIER_DENSITY_PER_M = 2e-4
 _DB_PER_E = 10.0 / math.log(10.0)
-_FALLING_FROM_DBM, _MOST_SCALE_M = -92.0, 10.0
+_WEAK_DBM, _LEAST_SCALE_M, _MOST_SCALE_M = -92.0, 0.05, 10.0
 _LEAST_NLOS, _MOST_NLOS = 0.01, 0.97
 _IMPOSSIBLE_SDS = 5.0
 
@@ -74,13 +74,44 @@ def predict(x: Array, P: Array, dimensions: int, gone_s: float, noise: Array) ->
 
 
 @njit(cache=True)
-def open_offset(x: Array, P: Array, dimensions: int, offset_m: float, offset_sd_m: float) -> None:
-    """Nothing is known of the offset of a new blink but a first guess."""
-    common = 2 * dimensions
-    x[common] = offset_m
+def open_offset(
+    x: Array,
+    P: Array,
+    dimensions: int,
+    anchor_m: Array,
+    slot: int,
+    arrival_m: float,
+    variance_m2: float,
+    since_s: float,
+    height_m: float,
+    nlos_probability: float,
+    nlos_scale_m: float,
+    work: Array,
+) -> None:
+    """Take the offset of a new blink from one arrival: all that is known of it is that arrival minus its distance.
+
+    An excess of probability p and mean s has mean p s and variance p (2 - p) s².
+    """
+    d, size, common, bias = dimensions, len(x), 2 * dimensions, 2 * dimensions + 1 + slot
+    at, unit, free = work[0], work[1], work[2]
+    for axis in range(d):
+        at[axis] = x[axis] + since_s * x[d + axis]
+    distance = direction(at[:d], anchor_m, height_m, unit[:d])
     P[common, :] = 0.0
     P[:, common] = 0.0
-    P[common, common] = offset_sd_m * offset_sd_m
+    for i in range(size):
+        free[i] = P[i, bias]
+        for axis in range(d):
+            free[i] += unit[axis] * (P[i, axis] + since_s * P[i, d + axis])
+    p = nlos_probability
+    variance = variance_m2 + p * (2.0 - p) * nlos_scale_m * nlos_scale_m + free[bias]
+    for axis in range(d):
+        variance += unit[axis] * (free[axis] + since_s * free[d + axis])
+    x[common] = arrival_m - distance - x[bias] - p * nlos_scale_m
+    for i in range(size):
+        P[common, i] = -free[i]
+        P[i, common] = -free[i]
+    P[common, common] = variance
 
 
 @njit(cache=True)
@@ -183,7 +214,7 @@ def take_round(
     level_dbm: Array,
     link_nlos: Array,
     gone_s: float,
-    offset_sd_m: float,
+    offset_unknown: int,
     gate: float,
     noise: Array,
     codes: Integers,
@@ -194,21 +225,28 @@ def take_round(
 
     What fits best is taken first, so that it decides what becomes of the rest. `link_nlos` (L,) is how far each link is
     believed to be obstructed by its own ranges; belief fades to the share of links that are. A judgement of the link
-    given beside the range (`los_probability`, at even odds) shifts it. `offset_sd_m` > 0 says that the ranges are
+    given beside the range (`los_probability`, at even odds) shifts it. `offset_unknown` = 1 says that the ranges are
     arrivals with an unknown offset. Leaves in `codes` and `deviances` (n,) what became of each range, in `quality` (3,)
     how many were accepted, the root mean square of what they differ by from the new state [m], and their dilution of
     precision.
     """
     work = np.empty((3, len(x)))
     predict(x, P, dimensions, gone_s, noise)
-    if offset_sd_m > 0.0:
-        first_m = _first_offset(x, dimensions, anchors_m, slots, range_m, height_m, work)
-        open_offset(x, P, dimensions, first_m, offset_sd_m)
     memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
     for slot in range(len(link_nlos)):  # of all links, heard or not
         link_nlos[slot] = share + memory * (link_nlos[slot] - share)
     todo = np.ones(len(range_m), np.bool_)
-    for _ in range(len(range_m)):
+    if offset_unknown > 0:
+        first = _surest(level_dbm, noise)
+        todo[first] = False
+        slot = slots[first]
+        belief = _shifted(share + memory * (link_nlos[slot] - share), los_probability[first])
+        codes[first], deviances[first], link_nlos[slot] = ACCEPTED, 0.0, belief
+        open_offset(
+            x, P, dimensions, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first], height_m,
+            belief, _scale_m(level_dbm[first], noise), work,
+        )  # fmt: skip
+    for _ in range(todo.sum()):
         number = _most_credible(x, dimensions, anchors_m, slots, range_m, height_m, todo, work)
         todo[number] = False
         slot = slots[number]
@@ -217,6 +255,10 @@ def take_round(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
             height_m, belief, _scale_m(level_dbm[number], noise), gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
+    if noise[LEVEL_SD] > 0.0:
+        for number in range(len(range_m)):
+            if codes[number] == ACCEPTED and not math.isnan(level_dbm[number]):
+                take_level(x, P, dimensions, anchors_m[number], level_dbm[number], height_m, noise, work)
     judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
 
 
@@ -252,9 +294,20 @@ def judge_round(
 def _scale_m(level_dbm: float, noise: Array) -> float:
     """Mean excess of an obstructed link: the weaker it is, the later its slow edge passes the threshold."""
     scale_m = noise[NLOS_SCALE]
-    if level_dbm < _FALLING_FROM_DBM:  # false for NaN
-        scale_m *= math.exp(noise[NLOS_GROWTH] * (_FALLING_FROM_DBM - level_dbm))
-    return min(scale_m, _MOST_SCALE_M)
+    if not math.isnan(level_dbm):
+        scale_m *= math.exp(noise[NLOS_GROWTH] * (_WEAK_DBM - level_dbm))
+    return min(max(scale_m, _LEAST_SCALE_M), _MOST_SCALE_M)
+
+
+@njit(cache=True)
+def _surest(level_dbm: Array, noise: Array) -> int:
+    """The arrival whose excess is least uncertain, the first of equals."""
+    best, least = 0, math.inf
+    for number in range(len(level_dbm)):
+        scale_m = _scale_m(level_dbm[number], noise)
+        if scale_m < least:
+            best, least = number, scale_m
+    return best
 
 
 @njit(cache=True)
@@ -286,15 +339,3 @@ def _most_credible(
             if error <= least:
                 best, least = number, error
     return best
-
-
-@njit(cache=True)
-def _first_offset(
-    x: Array, dimensions: int, anchors_m: Array, slots: Integers, range_m: Array, height_m: float, work: Array
-) -> float:
-    """The least of the arrivals' offsets: excess ways only make them greater."""
-    least = math.inf
-    for number in range(len(range_m)):
-        distance = direction(x[:dimensions], anchors_m[number], height_m, work[1, :dimensions])
-        least = min(least, range_m[number] - distance - x[2 * dimensions + 1 + slots[number]])
-    return least
