@@ -52,7 +52,7 @@ def cm8_solvers(given: Mapping[str, Any]) -> Solvers:
     ekf = true_variance_ekf(given)
     alone = TdoaRssParameters(excess_sd_m=given["arrival_sd_m"])
     solvers: Solvers = {"tdoa": lambda: TdoaRss(alone)}
-    for name in ("tdoa_rss", "ekf_tuned", "ekf_by_level", "pf_fixed_law", "pf"):
+    for name in ("tdoa_rss", "ekf_tuned", "ekf_by_level", "pf_fixed_law", "pf", "robust_tracker"):
         solvers[name] = lambda name=name: build(name, path_loss, given[name])  # type: ignore[misc]
     return {**solvers, "ekf": lambda: Ekf(ekf)}
 

@@ -7,6 +7,7 @@ number of random draws of its parameters from wide physical bounds, on the same 
 geometric mean over the scenes of its mean error.
 """
 
+import argparse
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,6 +23,7 @@ from mine_loc_uwb.ekf import Ekf, EkfParameters
 from mine_loc_uwb.late_arrival import LateArrival
 from mine_loc_uwb.particle_filter import ParticleFilter, ParticleFilterParameters
 from mine_loc_uwb.path_loss import PathLoss, fit_path_loss
+from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
 from mine_loc_uwb.solver import Solver
 from mine_loc_uwb.tdoa_rss import TdoaRss
 
@@ -30,6 +32,7 @@ TUNING_SEEDS = range(1000, 1010)
 DRAWS = 32
 BOUNDS = {
     "jerk_density_m2_s5": (1e-3, 1.0),
+    "acceleration_density_m2_s3": (1e-3, 1.0),
     "level_sd_db": (5.0, 100.0),
     "excess_sd_m": (0.5, 6.0),
     "core_sd_m": (0.2, 1.5),
@@ -45,6 +48,7 @@ TUNED: dict[str, tuple[str, ...]] = {
     "ekf_by_level": (*_EKF, "delay_m", "growth_per_db"),
     "pf_fixed_law": ("jerk_density_m2_s5", "level_sd_db", *_LAW),
     "pf": ("jerk_density_m2_s5", "level_sd_db", *_LAW, "growth_per_db"),
+    "robust_tracker": ("acceleration_density_m2_s3", "level_sd_db", *_LAW, "growth_per_db"),
     "tdoa_rss": ("level_weight", "excess_sd_m", "delay_m", "growth_per_db"),
 }
 
@@ -65,7 +69,31 @@ def build(name: str, path_loss: PathLoss, drawn: Mapping[str, float]) -> Solver:
     if name.startswith("ekf"):
         return Ekf(EkfParameters(path_loss, law=law, **rest))
     assert law is not None
+    if name == "robust_tracker":
+        return RobustTracker(tracker_settings(path_loss, law, **rest))
     return ParticleFilter(ParticleFilterParameters(path_loss, law=law, **rest))
+
+
+def tracker_settings(
+    path_loss: PathLoss,
+    law: LateArrival,
+    acceleration_density_m2_s3: float,
+    level_sd_db: float,
+    core_sd_m: float,
+) -> RobustTrackerSettings:
+    """Of the robust tracker: every link obstructed, its bias the law's core, which changes from blink to blink."""
+    return RobustTrackerSettings(
+        acceleration_density_m2_s3=acceleration_density_m2_s3,
+        bias_sd_m=core_sd_m,
+        bias_time_s=0.5,
+        nlos_scale_m=law.delay_m,
+        nlos_growth_per_db=law.growth_per_db,
+        nlos_time_s=0.05,
+        nlos_share=0.97,
+        path_loss=path_loss,
+        level_sd_db=level_sd_db,
+        max_start_sd_m=50.0,
+    )
 
 
 def measured(channel: Channel) -> dict[str, Any]:
@@ -103,10 +131,15 @@ def cost(make: Callable[[], Solver], tuning: Mapping[str, list[Walk]]) -> float:
 
 def main() -> None:
     """Measure and search."""
-    chosen: dict[str, Any] = {"cm7": measured("cm7"), "cm8": measured("cm8")}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="+", choices=TUNED, default=TUNED, help="solvers to choose for (default all)")
+    only = parser.parse_args().only
+    chosen: dict[str, Any] = json.loads(CHOSEN.read_text("utf-8")) if CHOSEN.exists() else {}
+    for channel in ("cm7", "cm8"):
+        chosen[channel] = chosen.get(channel, {}) | measured(channel)  # type: ignore[arg-type]
     path_loss = PathLoss(*chosen["cm8"]["path_loss"])
     tuning = {scene: [paper_d_runs(scene, "cm8", seed) for seed in TUNING_SEEDS] for scene in SCENES}
-    for name in TUNED:
+    for name in only:
         chosen["cm8"][name] = search(name, path_loss, tuning)
         CHOSEN.write_text(json.dumps(chosen, indent=2) + "\n", "utf-8")
     print(f"written: {CHOSEN}")

@@ -23,7 +23,7 @@ from mine_loc_sim.site_mine import mine_of
 from mine_loc_sim.tdoa_blink import AnchorSync, range_differences
 from mine_loc_sim.wearer import Wearer
 from mine_loc_uwb.measurements import Measurements
-from mine_loc_uwb.received_power import los_probability_from_powers, uncompress_dbm
+from mine_loc_uwb.received_power import los_probability_from_powers, odds_of_power_rule, uncompress_dbm
 
 Reals = NDArray[np.float64]
 Scene = Literal["triangle", "gallery"]
@@ -82,7 +82,7 @@ def _blink(number: int, row: Reals, ids: NDArray[np.uint64], anchors_m: Reals, h
         range_m=range_differences(row[heard, 3], row[heard, 6], 0) if count else np.empty(0),
         variance_m2=np.full(count, WHITE_SD_M**2),
         since_s=np.zeros(count),
-        los_probability=np.array([los_probability_from_powers(*pair) for pair in levels]),
+        los_probability=np.array([odds_of_power_rule(los_probability_from_powers(*pair)) for pair in levels]),
         receive_power_dbm=np.array([uncompress_dbm(level, 64) for level in row[heard, 4].tolist()]),
         height_m=height_m,
         shared_offset=True,
