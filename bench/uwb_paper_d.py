@@ -5,7 +5,7 @@
 Three nodes, 1 m/s on a straight line, 20 Hz, in two scenes (uwb_scenes/). What the solvers are given was measured or
 chosen on other seeds (uwb_paper_d_tuning.py). Figures: mean horizontal error of each walk, then mean and standard
 deviation over walks. A filter without a position is scored where its last one was, before the first at the middle of
-the nodes. `tdoa` and `tdoa_rss`, which know no motion, and the two filters in CM7 are scored over those blinks for which
+the nodes. `tdoa` and `tdoa_rss`, which know no motion, and the two filters in CM7 are scored over the blinks for which
 both have a position.
 """
 
