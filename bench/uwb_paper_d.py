@@ -32,7 +32,8 @@ from mine_loc_uwb.path_loss import PathLoss
 from mine_loc_uwb.solver import Solver
 from mine_loc_uwb.tdoa_rss import TdoaRss
 
-SEEDS = range(1, 51)
+SEEDS = range(101, 151)
+"""Looked at by nothing else: neither by the tuning (from 1000 on) nor while the solvers were written (below 100)."""
 NOMINAL_JERK_M2_S5 = 0.1
 """Where nothing is tuned: a person's acceleration wanders by 0.3 m/s² in a second."""
 Solvers = dict[str, Callable[[], Solver]]
@@ -146,7 +147,7 @@ def main() -> None:
     parser.add_argument(
         "--seeds", type=int, default=len(SEEDS), help=f"walks a scene and channel (default {len(SEEDS)})"
     )
-    figures = run(range(1, parser.parse_args().seeds + 1))
+    figures = run(range(SEEDS.start, SEEDS.start + parser.parse_args().seeds))
     Console().print(show(figures))
     print(json.dumps(figures, indent=2))
 
