@@ -5,34 +5,50 @@ from collections.abc import Mapping
 
 from uwb_tracks import MakeSolver
 
+from mine_loc_uwb.ekf import Ekf, EkfParameters
 from mine_loc_uwb.least_squares import LeastSquares
+from mine_loc_uwb.particle_filter import ParticleFilter, ParticleFilterParameters
 from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings
 
 LARGE_GDOP = 1e3
-DENSITIES = (0.05, 0.1, 0.3, 1.0)
+DENSITIES = (0.1, 0.3, 1.0)
 
 
 def candidates() -> Mapping[str, Mapping[str, MakeSolver]]:
-    """Solver, setting in words, maker; `robust_tracker` also as it comes."""
-    lm, tracker = {}, {}
-    for q, floor_m in itertools.product(DENSITIES, (0.02, 0.05, 0.1)):
-        lm[f"q={q} floor={floor_m}"] = _weighted_lm(q, floor_m)
-    for q, bias_m in itertools.product(DENSITIES, (0.02, 0.03, 0.05)):
-        tracker[f"q={q} bias={bias_m}"] = _robust_tracker(q, bias_m)
+    """Solver, setting in words, maker: six settings each of those that have any; `robust_tracker` also as it comes."""
+    lm, ekf, particles, tracker = {}, {}, {}, {}
+    for q, error_m in itertools.product(DENSITIES, (0.02, 0.05)):
+        lm[f"q={q} floor={error_m}"] = _weighted_lm(WeightedLmSettings(q, error_m, max_gdop=LARGE_GDOP))
+        tracker[f"q={q} bias={error_m}"] = _robust_tracker(RobustTrackerSettings(q, error_m))
+    for jerk, error_m in itertools.product((0.03, 0.1, 0.3), (0.05, 0.1)):
+        ekf[f"jerk={jerk} excess={error_m}"] = _ekf(
+            EkfParameters(jerk_density_m2_s5=jerk, excess_sd_m=error_m, max_gdop=LARGE_GDOP)
+        )
+        particles[f"jerk={jerk} core={error_m}"] = _particle_filter(
+            ParticleFilterParameters(jerk_density_m2_s5=jerk, core_sd_m=error_m, max_gdop=LARGE_GDOP)
+        )
     return {
         "least_squares": {"plain": lambda: LeastSquares(LARGE_GDOP)},
         "weighted_lm": lm,
+        "ekf": ekf,
+        "particle_filter": particles,
         "robust_tracker": tracker,
         "robust_tracker_default": {"default": RobustTracker},
     }
 
 
-def _weighted_lm(q: float, floor_m: float) -> MakeSolver:
-    settings = WeightedLmSettings(q, floor_m, max_gdop=LARGE_GDOP)
+def _weighted_lm(settings: WeightedLmSettings) -> MakeSolver:
     return lambda: WeightedLmFilter(settings)
 
 
-def _robust_tracker(q: float, bias_m: float) -> MakeSolver:
-    settings = RobustTrackerSettings(acceleration_density_m2_s3=q, bias_sd_m=bias_m)
+def _ekf(parameters: EkfParameters) -> MakeSolver:
+    return lambda: Ekf(parameters)
+
+
+def _particle_filter(parameters: ParticleFilterParameters) -> MakeSolver:
+    return lambda: ParticleFilter(parameters)
+
+
+def _robust_tracker(settings: RobustTrackerSettings) -> MakeSolver:
     return lambda: RobustTracker(settings)

@@ -30,7 +30,7 @@ class Measurements:
     los_probability: Array
     """NaN = not judged."""
     receive_power_dbm: Array
-    """NaN = not reported."""
+    """True levels (`received_power.uncompress_dbm`), NaN = not reported."""
     height_m: float | None = None
     """Known height of the tag; None = solve in space."""
     shared_offset: bool = False

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from mine_loc_core.parameters import NodeParameters, parameter
 from mine_loc_uwb.wire.detect import FORMATS
 
-RANGE_METHODS = ("robust_tracker", "least_squares", "weighted_lm")
-TDOA_METHODS = ("robust_tracker",)
+RANGE_METHODS = ("robust_tracker", "least_squares", "weighted_lm", "ekf", "particle_filter")
+TDOA_METHODS = ("robust_tracker", "tdoa_rss", "ekf", "particle_filter")
 """Keys of the tables in `solvers`, which is slow to import."""
 
 

@@ -15,13 +15,15 @@ from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.parameters import UwbSolverParameters
 from mine_loc_uwb.range_checks import RepeatedValues, impossible, stamp_reason
 from mine_loc_uwb.range_correction import RangeCorrection
-from mine_loc_uwb.received_power import odds_of_power_rule
+from mine_loc_uwb.received_power import odds_of_power_rule, uncompress_dbm
 from mine_loc_uwb.solver import Solution, Solver
 from mine_loc_uwb.solvers import RANGE_SOLVERS, TDOA_SOLVERS
 
 _MOST_TAGS = 4096
 _DEFAULT_VARIANCE_M2 = 0.1**2
 _LEAST_RANGE_M = 1e-3
+_PRF_MHZ = 64
+"""Levels are taken for those of radios at this pulse repetition frequency, which messages do not tell."""
 _LINK_STATE_HOLDS_NS = NS_PER_S
 """A walker passes what obstructs a link in about this time."""
 
@@ -188,7 +190,7 @@ class RoundSolver:
             variance_m2=variance_m2,
             since_s=np.array([item.since_ns / NS_PER_S for item in items], float) - self._correction.stamp_latency_s,
             los_probability=los_probability,
-            receive_power_dbm=power_dbm,
+            receive_power_dbm=uncompress_dbm(power_dbm, _PRF_MHZ),
             height_m=height_m,
             shared_offset=source is Source.TDOA,
         )
