@@ -29,6 +29,8 @@ _MOST_LINKS = 16
 _OFFSET_SD_M = 100.0
 _LONGEST_DOUBT_STEP_S = 0.5
 """A silence is not doubt: one round after it adds no more than this."""
+_COASTED_S, _WIDE_M = 1.0, 1.0
+"""Fewer ranges than coordinates for so long, a spread of so much: distances are no longer linear over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,10 @@ class RobustTracker:
         gone_s = max(measurements.stamp_ns - self._stamp_ns, 0) / NS_PER_S
         if not self._started or gone_s > self._settings.restart_after_s:
             return self._begin(measurements)
+        if self._is_vague(measurements, gone_s):
+            found = self._agreed_place(measurements)
+            if found is not None and self._can_be_at(found, measurements.stamp_ns):
+                return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
         codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
         quality = np.empty(3)
@@ -113,7 +119,9 @@ class RobustTracker:
         if count == 0:
             return solution
         if 2 * accepted > count:
-            self._doubt_s, self._trusted_ns = 0.0, measurements.stamp_ns
+            self._doubt_s = 0.0
+            if accepted >= measurements.dimensions:
+                self._trusted_ns = measurements.stamp_ns
             return solution
         self._doubt_s += min(gone_s, _LONGEST_DOUBT_STEP_S)
         if self._doubt_s < self._settings.reopen_after_s or measurements.shared_offset:
@@ -130,6 +138,16 @@ class RobustTracker:
         )
         return replace(solution, reasons=reasons)
 
+    def _is_vague(self, measurements: Measurements, gone_s: float) -> bool:
+        """Whether coasting has left a place so wide that ranges are better put together without it."""
+        d = measurements.dimensions
+        coasted_s = (measurements.stamp_ns - self._trusted_ns) / NS_PER_S
+        if coasted_s < _COASTED_S or len(measurements) <= d or measurements.shared_offset:
+            return False
+        here, moving, speed = (self._P[row : row + d, column : column + d] for row, column in ((0, 0), (0, d), (d, d)))
+        spread = np.trace(here + gone_s * (2.0 * moving + gone_s * speed))
+        return bool(spread + d * self._settings.acceleration_density_m2_s3 * gone_s**3 / 3.0 > _WIDE_M**2)
+
     def _agreed_place(self, measurements: Measurements) -> Consensus | None:
         """The one place where more ranges agree than its coordinates need: as many as those always agree somewhere."""
         found = self._consensus(measurements)
@@ -138,7 +156,7 @@ class RobustTracker:
         return found
 
     def _can_be_at(self, found: Consensus, stamp_ns: int) -> bool:
-        """Whether the person can have got there since ranges were last believed, or all have agreed on it for long."""
+        """Whether the person can have got there since ranges last held the place, or all have agreed on it for long."""
         gone_s = (stamp_ns - self._trusted_ns) / NS_PER_S
         d = len(found.position_m)
         sd_m = math.sqrt(np.trace(self._P[:d, :d]) + np.trace(found.covariance_m2))
