@@ -95,10 +95,9 @@ class RobustTracker:
         gone_s = max(measurements.stamp_ns - self._stamp_ns, 0) / NS_PER_S
         if not self._started or gone_s > self._settings.restart_after_s:
             return self._begin(measurements)
-        if self._is_vague(measurements, gone_s):
-            found = self._agreed_place(measurements)
-            if found is not None and self._can_be_at(found, measurements.stamp_ns):
-                return self._begin_at(found, measurements)
+        found = self._place_within_wide_spread(measurements, gone_s)
+        if found is not None:
+            return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
         codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
         quality = np.empty(3)
@@ -138,15 +137,20 @@ class RobustTracker:
         )
         return replace(solution, reasons=reasons)
 
-    def _is_vague(self, measurements: Measurements, gone_s: float) -> bool:
-        """Whether coasting has left a place so wide that ranges are better put together without it."""
+    def _place_within_wide_spread(self, measurements: Measurements, gone_s: float) -> Consensus | None:
+        """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
         d = measurements.dimensions
         coasted_s = (measurements.stamp_ns - self._trusted_ns) / NS_PER_S
         if coasted_s < _COASTED_S or len(measurements) <= d or measurements.shared_offset:
-            return False
+            return None
         here, moving, speed = (self._P[row : row + d, column : column + d] for row, column in ((0, 0), (0, d), (d, d)))
-        spread = np.trace(here + gone_s * (2.0 * moving + gone_s * speed))
-        return bool(spread + d * self._settings.acceleration_density_m2_s3 * gone_s**3 / 3.0 > _WIDE_M**2)
+        variance = float(np.trace(here + gone_s * (2.0 * moving + gone_s * speed)))
+        variance += d * self._settings.acceleration_density_m2_s3 * gone_s**3 / 3.0
+        found = self._agreed_place(measurements) if variance > _WIDE_M**2 else None
+        if found is None:
+            return None
+        way_m = float(np.linalg.norm(found.position_m - self._x[:d] - gone_s * self._x[d : 2 * d]))
+        return found if way_m < 3.0 * math.sqrt(variance) else None
 
     def _agreed_place(self, measurements: Measurements) -> Consensus | None:
         """The one place where more ranges agree than its coordinates need: as many as those always agree somewhere."""
@@ -183,10 +187,10 @@ class RobustTracker:
         """Start where ranges agree; of two places that are as good all are believed."""
         self._place(measurements, found.position_m, found.covariance_m2)
         codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.GATE)
-        quality = np.empty(3)
+        slots, quality = self._slots_of(measurements.anchor_ids), np.empty(3)
         kernel.judge_round(
-            self._x, measurements.dimensions, measurements.anchors_m, self._slots_of(measurements.anchor_ids),
-            measurements.range_m, measurements.since_s, measurements.plane_m, codes, quality,
+            self._x, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
+            measurements.since_s, measurements.plane_m, codes, quality,
         )  # fmt: skip
         reasons = tuple([_REASON[code] for code in codes.tolist()])
         return Solution(self._fix(measurements, quality), reasons, np.full(len(codes), math.nan), self._gate)

@@ -89,8 +89,8 @@ class Tag:
 
 
 def is_covariance(matrix: np.ndarray) -> bool:
-    """Finite, symmetric and positive semi-definite."""
-    if not (np.isfinite(matrix).all() and np.array_equal(matrix, matrix.T)):
+    """Finite, symmetric and positive semi-definite, to rounding."""
+    if not (np.isfinite(matrix).all() and np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-15)):
         return False
     return bool(np.linalg.eigvalsh(matrix)[0] >= -1e-9 * max(1e-6, np.abs(matrix).max()))
 
