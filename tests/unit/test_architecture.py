@@ -32,6 +32,7 @@ ROSDEP = {  # import name → rosdep key; rosbags has none
     "psutil": "python3-psutil",
     "rich": "python3-rich",
     "matplotlib": "python3-matplotlib",
+    "numba": "python3-numba",
 }
 MOST_LINES = 400
 
