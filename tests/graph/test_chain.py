@@ -3,6 +3,7 @@
 import itertools
 import math
 import os
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -198,9 +199,10 @@ def test_map_odom_base_link_ends_at_the_fused_pose(heard):
 # Measurements that must not be used, told by the visitor's tag, which nothing else drives.
 
 
-def visit(graph: LiveGraph, topics: dict[str, Heard], number: int, ranges: list[Range], device_s: float) -> Any:
-    """Send one round of the visitor; its verdicts by anchor and the fix it gave."""
-    message = replace(ranging(device_s, number, VISITOR_TAG), ranges=tuple(ranges))
+def visit(graph: LiveGraph, topics: dict[str, Heard], ranges: list[Range]) -> Any:
+    """Send a round that the visitor makes now; its verdicts by anchor and the fix it gave."""
+    now_s = time.monotonic() - graph.walker.start_s
+    message = replace(ranging(now_s, 2000 + round(now_s * 10.0), VISITOR_TAG), ranges=tuple(ranges))
     fixes, verdicts = topics["uwb_pose"].messages, topics["uwb_verdicts"].messages
     graph.walker.uwb.write(frame(message, 0))
     ours = lambda messages: [m for m in messages if m.tag_id == VISITOR_TAG]  # noqa: E731
@@ -221,7 +223,7 @@ def visit(graph: LiveGraph, topics: dict[str, Heard], number: int, ranges: list[
 )
 def test_a_bad_range_is_named_and_the_fix_comes_from_the_others(graph, heard, bad, reason):
     good = [r for r in ranging(0.0, 0).ranges if r.anchor_id != 5]
-    fix, verdicts = visit(graph, heard, 1, [*good, bad], 1.0)
+    fix, verdicts = visit(graph, heard, [*good, bad])
     assert (verdicts[bad.anchor_id].accepted, verdicts[bad.anchor_id].reason) == (False, reason)
     assert all(verdicts[r.anchor_id].accepted for r in good)
     assert (fix.status, fix.ranges_used, fix.ranges_rejected) == (UwbPose.OK, 4, 1)
@@ -236,12 +238,12 @@ def test_an_anchor_switched_off_is_left_out_until_switched_on(graph, heard):
     ranges = list(ranging(0.0, 0).ranges)
     assert switch(2, enabled=False).success
     try:
-        fix, verdicts = visit(graph, heard, 2, ranges, 2.0)
+        fix, verdicts = visit(graph, heard, ranges)
         assert verdicts[2].reason == MeasurementVerdict.DISABLED
         assert fix.ranges_used == 4
     finally:
         assert switch(2, enabled=True).success
-    assert visit(graph, heard, 3, ranges, 3.0)[1][2].accepted
+    assert visit(graph, heard, ranges)[1][2].accepted
     refusal = switch(99, enabled=False)
     assert not refusal.success
     assert "99" in refusal.reason

@@ -37,8 +37,8 @@ class Constraint:
             return "one of " + ", ".join(self.choices)
         if self.low is None and self.high is None:
             return "any value of its type"
-        low = "-inf" if self.low is None else f"{self.low:g}"
-        high = "inf" if self.high is None else f"{self.high:g}"
+        low = "-inf" if self.low is None else f"{self.low:.9g}"
+        high = "inf" if self.high is None else f"{self.high:.9g}"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{low} to {high}{unit}".rstrip()
 

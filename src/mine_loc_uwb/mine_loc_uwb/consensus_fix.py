@@ -61,6 +61,8 @@ def consensus_fix(
         for deviance, other, *_ in minima
         if deviance - least < _AS_GOOD and np.linalg.norm(other - position) > reach_m
     ]
+    # Ranges that disagree more than their noise allows have not been made right by the place they agree on best.
+    covariance *= max(1.0, least / max(len(range_m) - dimensions, 1))
     if not others:
         return Consensus(position, covariance, agreeing, ambiguous=False)
     places = np.array([position, max(others, key=lambda other: float(np.linalg.norm(other - position)))])

@@ -31,6 +31,8 @@ _REASON = {kernel.ACCEPTED: Reason.ACCEPTED, kernel.GATE: Reason.GATE, kernel.KI
 _MOST_LINKS = 16
 _LONGEST_DOUBT_STEP_S = 0.5
 """A silence is not doubt: one round after it adds no more than this."""
+_COASTED_S, _WIDE_M = 1.0, 1.0
+"""Fewer ranges than coordinates for so long, a spread of so much: distances are no longer linear over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +108,9 @@ class RobustTracker:
         gone_s = max(measurements.stamp_ns - self._stamp_ns, 0) / NS_PER_S
         if not self._started or gone_s > self._settings.restart_after_s:
             return self._begin(measurements)
+        found = self._place_within_wide_spread(measurements, gone_s)
+        if found is not None:
+            return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
         codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
         quality = np.empty(3)
@@ -126,7 +131,9 @@ class RobustTracker:
         if count == 0:
             return solution
         if 2 * accepted > count:
-            self._doubt_s, self._trusted_ns = 0.0, measurements.stamp_ns
+            self._doubt_s = 0.0
+            if accepted >= measurements.dimensions:
+                self._trusted_ns = measurements.stamp_ns
             return solution
         self._doubt_s += min(gone_s, _LONGEST_DOUBT_STEP_S)
         if self._doubt_s < self._settings.reopen_after_s or measurements.shared_offset:
@@ -143,6 +150,21 @@ class RobustTracker:
         )
         return replace(solution, reasons=reasons)
 
+    def _place_within_wide_spread(self, measurements: Measurements, gone_s: float) -> Consensus | None:
+        """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
+        d = measurements.dimensions
+        coasted_s = (measurements.stamp_ns - self._trusted_ns) / NS_PER_S
+        if coasted_s < _COASTED_S or len(measurements) <= d or measurements.shared_offset:
+            return None
+        here, moving, speed = (self._P[row : row + d, column : column + d] for row, column in ((0, 0), (0, d), (d, d)))
+        variance = float(np.trace(here + gone_s * (2.0 * moving + gone_s * speed)))
+        variance += d * self._settings.acceleration_density_m2_s3 * gone_s**3 / 3.0
+        found = self._agreed_place(measurements) if variance > _WIDE_M**2 else None
+        if found is None:
+            return None
+        way_m = float(np.linalg.norm(found.position_m - self._x[:d] - gone_s * self._x[d : 2 * d]))
+        return found if way_m < 3.0 * math.sqrt(variance) else None
+
     def _agreed_place(self, measurements: Measurements) -> Consensus | None:
         """The one place where more ranges agree than its coordinates need: as many as those always agree somewhere."""
         found = self._consensus(measurements)
@@ -151,7 +173,7 @@ class RobustTracker:
         return found
 
     def _can_be_at(self, found: Consensus, stamp_ns: int) -> bool:
-        """Whether the person can have got there since ranges were last believed, or all have agreed on it for long."""
+        """Whether the person can have got there since ranges last held the place, or all have agreed on it for long."""
         gone_s = (stamp_ns - self._trusted_ns) / NS_PER_S
         d = len(found.position_m)
         sd_m = math.sqrt(np.trace(self._P[:d, :d]) + np.trace(found.covariance_m2))
@@ -178,10 +200,10 @@ class RobustTracker:
         """Start where ranges agree; of two places that are as good all are believed."""
         self._place(measurements, found.position_m, found.covariance_m2)
         codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.GATE)
-        quality = np.empty(3)
+        slots, quality = self._slots_of(measurements.anchor_ids), np.empty(3)
         kernel.judge_round(
-            self._x, measurements.dimensions, measurements.anchors_m, self._slots_of(measurements.anchor_ids),
-            measurements.range_m, measurements.since_s, measurements.plane_m, codes, quality,
+            self._x, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
+            measurements.since_s, measurements.plane_m, codes, quality,
         )  # fmt: skip
         reasons = tuple([_REASON[code] for code in codes.tolist()])
         return Solution(self._fix(measurements, quality), reasons, np.full(len(codes), math.nan), self._gate)

@@ -26,6 +26,7 @@ _PRF_MHZ = 64
 """Levels are taken for those of radios at this pulse repetition frequency, which messages do not tell."""
 _LINK_STATE_HOLDS_NS = NS_PER_S
 """A walker passes what obstructs a link in about this time."""
+_LONGEST_ROUND_NS = NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,7 @@ class RoundSolver:
         self._parameters = parameters
         self._correction = correction or RangeCorrection()
         self._tags: OrderedDict[tuple[int, Source], _Tag] = OrderedDict()
-        self._link_states: dict[int, dict[int, tuple[float, int]]] = {}
+        self._link_states: OrderedDict[int, dict[int, tuple[float, int]]] = OrderedDict()
 
     @property
     def parameters(self) -> UwbSolverParameters:
@@ -90,8 +91,12 @@ class RoundSolver:
 
     def link_state(self, tag_id: int, anchor_id: int, stamp_ns: int, los_probability: float) -> None:
         """A judgement of the classifier; counts before the powers' for the link's measurements of the next second."""
-        if anchor_id in self.anchors and len(self._link_states) < _MOST_TAGS:
-            self._link_states.setdefault(tag_id, {})[anchor_id] = los_probability, stamp_ns
+        if anchor_id not in self.anchors:
+            return
+        self._link_states.setdefault(tag_id, {})[anchor_id] = los_probability, stamp_ns
+        self._link_states.move_to_end(tag_id)
+        if len(self._link_states) > _MOST_TAGS:
+            self._link_states.popitem(last=False)
 
     def reset(self) -> None:
         """Forget what rests on earlier stamps."""
@@ -165,6 +170,8 @@ class RoundSolver:
         value_m = item.range_m if difference else item.range_m - anchor.range_offset_m
         if impossible(value_m, self._parameters.max_range_m, difference=difference):
             return Reason.INVALID
+        if abs(item.since_ns) > _LONGEST_ROUND_NS:
+            return Reason.INVALID
         reference = difference and item.range_m == 0.0
         if not reference and tag.repeated.frozen(item.anchor_id, item.range_m):
             return Reason.FROZEN
@@ -197,9 +204,9 @@ class RoundSolver:
 
     def _los_probability(self, tag_id: int, stamp_ns: int, item: MeasuredRange) -> float:
         told, told_ns = self._link_states.get(tag_id, {}).get(item.anchor_id, (math.nan, 0))
-        if not math.isnan(told) and abs(stamp_ns - told_ns) <= _LINK_STATE_HOLDS_NS:
+        if 0.0 <= told <= 1.0 and abs(stamp_ns - told_ns) <= _LINK_STATE_HOLDS_NS:
             return told
-        return odds_of_power_rule(item.los_probability)
+        return odds_of_power_rule(item.los_probability) if 0.0 <= item.los_probability <= 1.0 else math.nan
 
 
 def rehearse(parameters: UwbSolverParameters, dimensions: int) -> None:

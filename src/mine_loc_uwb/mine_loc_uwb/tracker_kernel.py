@@ -164,8 +164,9 @@ def take_range(
     second = min(max(second, 0.0), 1.0 / variance)
     for i in range(size):
         x[i] += first * gain[i]
-        for j in range(size):
+        for j in range(i + 1):  # mirrored, because rounding that is not would grow with the square of time
             P[i, j] -= second * gain[i] * gain[j]
+            P[j, i] = P[i, j]
     return ACCEPTED, distance_sq, nlos
 
 

@@ -81,3 +81,11 @@ def test_fewer_ranges_than_coordinates_give_nothing(count, height_m):
 def test_anchors_in_one_place_give_nothing():
     anchors = np.repeat(ROOM[:1], 4, axis=0)
     assert find(anchors, distances(anchors, TAG)) is None
+
+
+def test_ranges_that_contradict_each_other_widen_what_is_claimed():
+    ranges = distances(ROOM, TAG)
+    agreed, torn = (find(ROOM, ranges + np.array([late, 0.0, late, 0.0, late, 0.0])) for late in (0.0, 2.0))
+    assert np.trace(torn.covariance_m2) > 3.0 * np.trace(agreed.covariance_m2)
+    error = torn.position_m - TAG[:2]
+    assert error @ np.linalg.solve(torn.covariance_m2, error) < 9.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_uwb.measurements import Measurements
+from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
 
 ROOM = np.array(
     [[0.0, 0.0, 2.4], [20.0, 0.0, 2.8], [20.0, 15.0, 2.4], [0.0, 15.0, 2.8], [10.0, -2.0, 0.4], [9.0, 17.0, 2.0]]
@@ -88,9 +89,47 @@ class Tag:
         return float(np.linalg.norm(fix.position_m - self.at(at_s)))
 
 
+PERIOD_S = 0.1
+
+
+class Track:
+    """A tag and its tracker, round after round."""
+
+    def __init__(self, tag: Tag, settings: RobustTrackerSettings | None = None) -> None:
+        self.tag, self.tracker, self.at_s = tag, RobustTracker(settings), 0.0
+
+    def round(self, **what):
+        """The next round; see `Tag.round`."""
+        self.at_s += PERIOD_S
+        return self.tracker.solve(self.tag.round(self.at_s, **what))
+
+    def play(self, seconds: float, **what):
+        """Rounds for so long; the last solution."""
+        for _ in range(round(seconds / PERIOD_S)):
+            solution = self.round(**what)
+        return solution
+
+    def silence(self, seconds: float) -> None:
+        self.at_s += seconds
+
+    def error_m(self, solution) -> float:
+        return self.tag.error_m(solution.fix, self.at_s)
+
+    def pretending(self, place, who) -> dict[int, float]:
+        """The excess with which these anchors agree that the tag is at another place."""
+        here, there = (distances(self.tag.anchors, at) for at in (self.tag.at(self.at_s + PERIOD_S), place))
+        return {anchor: float((there - here)[anchor]) for anchor in who}
+
+
+def tracked(seed=0, seconds=3.0, **tag):
+    track = Track(Tag(seed, **tag))
+    track.play(seconds)
+    return track
+
+
 def is_covariance(matrix: np.ndarray) -> bool:
-    """Finite, symmetric and positive semi-definite."""
-    if not (np.isfinite(matrix).all() and np.array_equal(matrix, matrix.T)):
+    """Finite, symmetric and positive semi-definite, to rounding."""
+    if not (np.isfinite(matrix).all() and np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-15)):
         return False
     return bool(np.linalg.eigvalsh(matrix)[0] >= -1e-9 * max(1e-6, np.abs(matrix).max()))
 
