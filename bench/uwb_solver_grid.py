@@ -12,7 +12,7 @@ from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings
 
 LARGE_GDOP = 1e3
-DENSITIES = (0.1, 0.3, 1.0)
+DENSITIES = (0.1, 0.2, 0.5)
 
 
 def candidates() -> Mapping[str, Mapping[str, MakeSolver]]:

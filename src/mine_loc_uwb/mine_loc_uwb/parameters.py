@@ -42,10 +42,16 @@ class UwbSolverParameters(NodeParameters):
     arrival_sd_m: float = parameter(0.15, "standard deviation of a blink's arrivals", unit="m", low=0.001, high=10.0)
     max_gdop: float = parameter(10.0, "geometry beyond it is degenerate", unit="1", low=1.0, high=1000.0)
     acceleration_density: float = parameter(
-        0.1, "spectral density of a person's acceleration", unit="m^2/s^3", low=1e-4, high=100.0
+        0.2, "spectral density of a person's acceleration", unit="m^2/s^3", low=1e-4, high=100.0
     )
     top_speed: float = parameter(3.0, "nobody moves faster against the anchors", unit="m/s", low=0.5, high=50.0)
     nlos_share: float = parameter(0.5, "share of links that are obstructed here", unit="1", low=0.01, high=0.95)
+    nlos_excess: float = parameter(0.6, "mean excess way of an obstructed link", unit="m", low=0.01, high=20.0)
+    path_loss_exponent: float = parameter(
+        0.0, "of levels over distance, 1.2 in a clear gallery; 0 = levels are not used", unit="1", low=0.0, high=6.0
+    )
+    path_loss_level_1m: float = parameter(-71.0, "level at a metre", unit="dBm", low=-120.0, high=0.0)
+    path_loss_shadowing: float = parameter(6.0, "standard deviation of levels about it", unit="dB", low=0.1, high=30.0)
     gate: float = parameter(
         0.9999, "probability that a range as it should be passes", unit="1", low=0.9, high=0.9999999
     )

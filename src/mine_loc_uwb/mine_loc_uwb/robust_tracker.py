@@ -17,13 +17,14 @@ from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason
 from mine_loc_uwb import tracker_kernel as kernel
+from mine_loc_uwb.blink_likelihood import TdoaRssParameters
 from mine_loc_uwb.consensus_fix import Consensus, consensus_fix
 from mine_loc_uwb.fix import Array, Fix, FixStatus, no_fix
 from mine_loc_uwb.late_arrival import LateArrival
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.path_loss import PathLoss
 from mine_loc_uwb.solver import Solution
-from mine_loc_uwb.tdoa_rss import TdoaRssParameters, solve_blink
+from mine_loc_uwb.tdoa_rss import solve_blink
 
 Ids = npt.NDArray[np.uint64]
 Slots = npt.NDArray[np.int64]
@@ -39,9 +40,9 @@ _COASTED_S, _WIDE_M = 1.0, 1.0
 class RobustTrackerSettings:
     """The person and the radio in physical units."""
 
-    acceleration_density_m2_s3: float = 0.1
+    acceleration_density_m2_s3: float = 0.2
     """Spectral density of white acceleration: people walk steadily; a turn is seen within some rounds."""
-    bias_sd_m: float = 0.03
+    bias_sd_m: float = 0.02
     bias_time_s: float = 100.0
     """Of a link, beyond what is calibrated."""
     common_bias_sd_m: float = 0.05
@@ -112,12 +113,12 @@ class RobustTracker:
         if found is not None:
             return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
-        codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
-        quality = np.empty(3)
+        codes, deviances, quality = np.empty(len(slots), np.int64), np.empty(len(slots)), np.empty(3)
+        offset_unknown = int(measurements.shared_offset and len(slots) > 0)
         kernel.take_round(
             self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
             measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
-            measurements.receive_power_dbm, self._link_nlos, gone_s, int(measurements.shared_offset and len(slots) > 0), self._gate, self._noise,
+            measurements.receive_power_dbm, self._link_nlos, gone_s, offset_unknown, self._gate, self._noise,
             codes, deviances, quality,
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
@@ -136,7 +137,7 @@ class RobustTracker:
                 self._trusted_ns = measurements.stamp_ns
             return solution
         self._doubt_s += min(gone_s, _LONGEST_DOUBT_STEP_S)
-        if self._doubt_s < self._settings.reopen_after_s or measurements.shared_offset:
+        if self._doubt_s < self._settings.reopen_after_s:
             return solution
         found = self._agreed_place(measurements)
         if found is None:
@@ -154,7 +155,7 @@ class RobustTracker:
         """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
         d = measurements.dimensions
         coasted_s = (measurements.stamp_ns - self._trusted_ns) / NS_PER_S
-        if coasted_s < _COASTED_S or len(measurements) <= d or measurements.shared_offset:
+        if coasted_s < _COASTED_S or len(measurements) <= d:
             return None
         here, moving, speed = (self._P[row : row + d, column : column + d] for row, column in ((0, 0), (0, d), (d, d)))
         variance = float(np.trace(here + gone_s * (2.0 * moving + gone_s * speed)))
@@ -167,16 +168,15 @@ class RobustTracker:
 
     def _agreed_place(self, measurements: Measurements) -> Consensus | None:
         """The one place where more ranges agree than its coordinates need: as many as those always agree somewhere."""
-        found = self._consensus(measurements)
-        if found is None or found.ambiguous or found.agreeing.sum() <= measurements.dimensions:
-            return None
-        return found
+        found = self._consensus(measurements) if len(measurements) > measurements.dimensions else None
+        unknowns = measurements.dimensions + measurements.shared_offset
+        return None if found is None or found.ambiguous or found.agreeing.sum() <= unknowns else found
 
     def _can_be_at(self, found: Consensus, stamp_ns: int) -> bool:
         """Whether the person can have got there since ranges last held the place, or all have agreed on it for long."""
         gone_s = (stamp_ns - self._trusted_ns) / NS_PER_S
         d = len(found.position_m)
-        sd_m = math.sqrt(np.trace(self._P[:d, :d]) + np.trace(found.covariance_m2))
+        sd_m = math.sqrt(np.trace(found.covariance_m2))
         way_m = float(np.linalg.norm(found.position_m - self._x[:d]))
         unanimous = len(found.agreeing) > d + 1 and bool(found.agreeing.all())
         return way_m <= self._settings.top_speed_m_s * gone_s + 2.0 * sd_m or (

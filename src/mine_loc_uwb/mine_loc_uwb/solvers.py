@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
+from mine_loc_uwb.blink_likelihood import TdoaRssParameters
 from mine_loc_uwb.ekf import Ekf, EkfParameters
 from mine_loc_uwb.late_arrival import LateArrival
 from mine_loc_uwb.least_squares import LeastSquares
@@ -10,7 +11,7 @@ from mine_loc_uwb.particle_filter import ParticleFilter, ParticleFilterParameter
 from mine_loc_uwb.path_loss import PathLoss
 from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
 from mine_loc_uwb.solver import Solver
-from mine_loc_uwb.tdoa_rss import TdoaRss, TdoaRssParameters
+from mine_loc_uwb.tdoa_rss import TdoaRss
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings
 
 MakeSolver = Callable[[UwbSolverParameters], Solver]

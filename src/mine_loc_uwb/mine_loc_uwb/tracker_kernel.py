@@ -297,7 +297,7 @@ def _scale_m(level_dbm: float, noise: Array) -> float:
     scale_m = noise[NLOS_SCALE]
     if not math.isnan(level_dbm):
         scale_m *= math.exp(noise[NLOS_GROWTH] * (_WEAK_DBM - level_dbm))
-    return min(max(scale_m, _LEAST_SCALE_M), _MOST_SCALE_M)
+    return float(min(max(scale_m, _LEAST_SCALE_M), _MOST_SCALE_M))
 
 
 @njit(cache=True)
