@@ -42,7 +42,7 @@ class UwbSolverParameters(NodeParameters):
     arrival_sd_m: float = parameter(0.15, "standard deviation of a blink's arrivals", unit="m", low=0.001, high=10.0)
     max_gdop: float = parameter(10.0, "geometry beyond it is degenerate", unit="1", low=1.0, high=1000.0)
     acceleration_density: float = parameter(
-        0.2, "spectral density of a person's acceleration", unit="m^2/s^3", low=1e-4, high=100.0
+        0.1, "spectral density of a person's acceleration", unit="m^2/s^3", low=1e-4, high=100.0
     )
     top_speed: float = parameter(3.0, "nobody moves faster against the anchors", unit="m/s", low=0.5, high=50.0)
     nlos_share: float = parameter(0.5, "share of links that are obstructed here", unit="1", low=0.01, high=0.95)

@@ -145,7 +145,8 @@ class ParticleFilter:
         if used.all():
             self._agreed_ns = measurements.stamp_ns
         fix = self._fix(measurements, int(used.sum()))
-        reasons = tuple(Reason.ACCEPTED if each else Reason.GATE for each in used.tolist())
+        taken_for = Reason.ACCEPTED if fix.status is FixStatus.OK else Reason.DEGENERATE
+        reasons = tuple(taken_for if each else Reason.GATE for each in used.tolist())
         return Solution(fix, reasons, mahalanobis_sq, self._gate)
 
     def _log_likelihood(self, measurements: Measurements, used: NDArray[np.bool_]) -> Array:

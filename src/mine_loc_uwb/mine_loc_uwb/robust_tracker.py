@@ -40,9 +40,9 @@ _COASTED_S, _WIDE_M = 1.0, 1.0
 class RobustTrackerSettings:
     """The person and the radio in physical units."""
 
-    acceleration_density_m2_s3: float = 0.2
+    acceleration_density_m2_s3: float = 0.1
     """Spectral density of white acceleration: people walk steadily; a turn is seen within some rounds."""
-    bias_sd_m: float = 0.02
+    bias_sd_m: float = 0.03
     bias_time_s: float = 100.0
     """Of a link, beyond what is calibrated."""
     common_bias_sd_m: float = 0.05

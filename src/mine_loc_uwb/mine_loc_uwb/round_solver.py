@@ -22,6 +22,7 @@ from mine_loc_uwb.solvers import RANGE_SOLVERS, TDOA_SOLVERS
 _MOST_TAGS = 4096
 _DEFAULT_VARIANCE_M2 = 0.1**2
 _LEAST_RANGE_M = 1e-3
+_NO_LEVEL_DBM = 200.0
 _PRF_MHZ = 64
 """Levels are taken for those of radios at this pulse repetition frequency, which messages do not tell."""
 _LINK_STATE_HOLDS_NS = NS_PER_S
@@ -183,6 +184,7 @@ class RoundSolver:
         anchors = [self.anchors[item.anchor_id] for item in items]
         los_probability = np.array([self._los_probability(tag_id, stamp_ns, item) for item in items], float)
         power_dbm = np.array([item.receive_power_dbm for item in items], float)
+        power_dbm[~(np.abs(power_dbm) < _NO_LEVEL_DBM)] = math.nan
         range_m = np.array([item.range_m for item in items], float)
         variance_m2 = np.array([_variance(item, anchor) for item, anchor in zip(items, anchors, strict=True)], float)
         if source is Source.RANGE:

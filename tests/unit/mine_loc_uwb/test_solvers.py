@@ -77,9 +77,9 @@ def test_a_known_height_is_kept(method):
 def test_anchors_all_on_a_line_are_degenerate_or_spanned(method):
     tag = Tag(3, anchors=LINE, start_m=(22.0, 4.0, 1.0))
     solution = solver(method).solve(tag.round(0.0))
-    if method == "robust_tracker":
-        assert abs(solution.fix.position_m[1]) < 0.5
-        assert sd_m(solution.fix) > 3.0
+    if method in {"robust_tracker", "particle_filter"} and solution.fix.status is FixStatus.OK:
+        assert abs(solution.fix.position_m[1]) < 1.0
+        assert sd_m(solution.fix) > 2.5
     else:
         assert solution.fix.status is FixStatus.DEGENERATE
         assert set(solution.reasons) == {Reason.DEGENERATE}

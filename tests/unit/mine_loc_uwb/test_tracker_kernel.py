@@ -77,8 +77,8 @@ def test_left_alone_biases_return_to_nothing_known():
 
 def take(x, P, dimensions, anchor, range_m, *, nlos=0.0, since_s=0.0, gate=NO_GATE, variance=0.01, reach_m=0.3, slot=0):
     return kernel.take_range(
-        x, P, dimensions, np.asarray(anchor, float), slot, range_m, variance, since_s, 1.0, nlos, reach_m, gate, NOISE,
-        np.empty((3, len(x))),
+        x, P, dimensions, np.asarray(anchor, float), slot, range_m, variance, since_s, 1.0, nlos, SETTINGS.nlos_scale_m,
+        reach_m, gate, np.empty((3, len(x))),
     )  # fmt: skip
 
 
@@ -148,14 +148,14 @@ def test_a_range_believed_obstructed_pulls_less_than_one_believed_clear():
     assert moved[0] > 1.5 * moved[1] > 1.5 * moved[2]
 
 
-def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_sd_m=0.0, gate=15.0):
+def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_unknown=0, gate=15.0):
     """A round of ranges of the room; codes, deviances and quality."""
     count = len(ranges)
     codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(3)
     kernel.take_round(
         x, P, 2, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count), 1.0,
-        np.full(count, los), np.full(count, 0.5) if link_nlos is None else link_nlos, gone_s, offset_sd_m, gate, NOISE,
-        codes, deviances, quality,
+        np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos, gone_s,
+        offset_unknown, gate, NOISE, codes, deviances, quality,
     )  # fmt: skip
     return codes, deviances, quality
 
@@ -168,7 +168,7 @@ def test_arrivals_of_a_blink_may_all_be_shifted_alike(seed, shift_m):
     for shift in (0.0, shift_m):
         x, P = state(seed, 2, len(ROOM))
         x[4:] *= 0.1
-        codes, deviances, _ = play(x, P, arrivals + shift, offset_sd_m=100.0)
+        codes, deviances, _ = play(x, P, arrivals + shift, offset_unknown=1)
         results.append((codes, deviances, np.delete(x, 4), P))
     for here, shifted in zip(*results, strict=True):
         assert here == pytest.approx(shifted, rel=1e-6, abs=1e-6)
