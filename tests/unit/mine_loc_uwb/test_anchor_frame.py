@@ -56,6 +56,10 @@ def test_the_only_vehicle_of_a_site_without_other_anchors_needs_no_naming(site):
     assert (frame.name, ids(frame)) == ("shuttle/base_link", [3, 4])
 
 
+def test_the_only_vehicle_of_a_mine_that_has_anchors_of_its_own_must_be_named(site):
+    assert ids(anchor_frame(replace(site, vehicles=site.vehicles[:1]), "")) == [1, 2, 5]
+
+
 def test_of_several_vehicles_none_is_guessed(site):
     assert anchor_frame(only_carried(site, "shuttle", "loader"), "").name == "map"
 

@@ -61,10 +61,10 @@ def test_half_of_the_anchors_agreeing_on_another_place_do_not_move_it(liars):
     assert set(solution.reasons) & {Reason.GATE, Reason.KINEMATIC, Reason.CAPTURE_GUARD}
 
 
-def test_three_ranges_in_space_agree_somewhere_whatever_they_say_and_capture_nothing():
-    track = tracked(15, space=True, start_m=(8.0, 7.0, 1.2))
-    for _ in range(23):
-        solution = track.round(only=[0, 1, 4], excess={0: -4.0, 1: -5.0, 4: -3.0})
-        assert set(solution.reasons) <= {Reason.KINEMATIC, Reason.GATE}
-        assert solution.fix.ranges_used == 0
-    assert track.error_m(solution) < 1.0
+@pytest.mark.parametrize(("space", "too_few"), [(False, 2), (True, 3)])
+@pytest.mark.parametrize("seed", range(6))
+def test_as_many_ranges_as_coordinates_agree_somewhere_whatever_they_say_and_are_not_believed(seed, space, too_few):
+    track = tracked(seed, space=space, start_m=(8.0, 7.0, 1.2))
+    lies = {liar: 7.0 + 5.0 * liar for liar in range(too_few, len(ROOM))}
+    assert track.tracker._agreed_place(track.tag.round(track.at_s, excess=lies)) is None
+    assert track.tracker._agreed_place(track.tag.round(track.at_s)) is not None

@@ -160,6 +160,16 @@ def test_after_few_ranges_a_full_round_finds_the_tag_again(heard, seconds):
     assert track.error_m(track.play(1.0)) < 0.2
 
 
+@pytest.mark.parametrize("seconds", [5.0, 10.0, 15.0])
+@pytest.mark.parametrize("anchor", [0, 4])
+def test_after_a_walk_with_one_anchor_no_wrong_place_that_some_ranges_fit_is_held(anchor, seconds):
+    for seed in range(8):
+        track = tracked(seed, start_m=(6.0 + seed % 7, 5.0 + seed % 5, 1.0))
+        track.play(seconds, only=[anchor])
+        track.tag._start[:2] += [3.0, 4.0]
+        assert track.error_m(track.play(1.0)) < 0.3
+
+
 @pytest.mark.parametrize("seconds", [1.0, 5.0, 15.0, 20.0, 25.0, 29.0, 31.0, 300.0])
 @pytest.mark.parametrize("speed_m_s", [0.0, 0.4])
 def test_after_a_silence_no_jump_is_claimed_as_certain(seconds, speed_m_s):

@@ -40,6 +40,14 @@ def test_a_repeated_or_backward_stamp_is_refused_and_changes_nothing(method, lat
     assert troubled.position_m.tolist() == untroubled.position_m.tolist()
 
 
+def test_rounds_that_come_late_are_as_good_as_prompt_ones():
+    subject, rng = solver(), np.random.default_rng(4)
+    for number in range(10):
+        stamp_ns = NOW_NS + number * NS_PER_S // 10
+        _, verdicts = subject.solve(7, stamp_ns, stamp_ns + 3 * NS_PER_S, noisy(rng), 1.0)
+        assert set(reasons(verdicts)) == {Reason.ACCEPTED}
+
+
 def test_stamps_of_different_tags_have_nothing_to_do_with_each_other():
     subject = solver()
     subject.solve(7, NOW_NS, NOW_NS, ranges(), 1.0)
