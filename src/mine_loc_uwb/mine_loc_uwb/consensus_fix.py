@@ -10,12 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from mine_loc_uwb.fix import Array
-from mine_loc_uwb.geometry import inverse_information
+from mine_loc_uwb.geometry import direction, inverse_information
 from mine_loc_uwb.weighted_lm import weighted_lm
 
-_DIRECTIONS = 8
+_DIRECTIONS, _NEAREST = 8, 4
+_KNEE_SDS = 2.0
 _REWEIGHTINGS = 6
 _AS_GOOD = 6.0  # more deviance than this makes a minimum a worse explanation
 _SAME_PLACE_SDS = 4.0
@@ -39,15 +41,10 @@ def consensus_fix(
     if len(range_m) < dimensions:
         return None
     height = math.nan if height_m is None else height_m
-    minima = []
-    for start in _starts(anchors_m, range_m, dimensions):
-        position = start
-        weights = np.ones(len(range_m))
-        for _ in range(_REWEIGHTINGS):
-            position = weighted_lm(position, anchors_m, range_m, weights, height)
-            residual = _residual(position, anchors_m, range_m, height_m)
-            weights = _weights(residual, range_sd_m, nlos_scale_m)
-        minima.append((float(_deviance(residual, range_sd_m, nlos_scale_m).sum()), position, residual, weights))
+    minima = [
+        _descend(start, anchors_m, range_m, range_sd_m, nlos_scale_m, height)
+        for start in _starts(anchors_m, range_m, dimensions)
+    ]
     minima.sort(key=lambda minimum: minimum[0])
     least, position, residual, weights = minima[0]
     covariance = np.empty((dimensions, dimensions))
@@ -72,27 +69,39 @@ def consensus_fix(
 
 
 def _starts(anchors_m: Array, range_m: Array, dimensions: int) -> Array:
-    """Points round each anchor at its range, (s, d)."""
+    """Points round the anchors of the shortest ranges, at those, (s, d)."""
+    near = np.argsort(range_m, kind="stable")[:_NEAREST]
     angle = (np.arange(_DIRECTIONS) + 0.25) * (2.0 * np.pi / _DIRECTIONS)
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     if dimensions == 3:
         ring = np.concatenate([np.column_stack([ring, np.full(len(ring), up)]) for up in (-0.7, 0.1, 0.7)])
-    return np.asarray((anchors_m[:, None, :dimensions] + range_m[:, None, None] * ring).reshape(-1, dimensions))
+    starts = anchors_m[near, None, :dimensions] + range_m[near, None, None] * ring
+    return np.ascontiguousarray(starts.reshape(-1, dimensions))
 
 
-def _residual(position: Array, anchors_m: Array, range_m: Array, height_m: float | None) -> Array:
-    place = position if height_m is None else np.append(position, height_m)
-    return np.asarray(range_m - np.linalg.norm(anchors_m - place, axis=1))
+@njit(cache=True)
+def _descend(
+    start: Array, anchors_m: Array, range_m: Array, sd_m: float, scale_m: float, height_m: float
+) -> tuple[float, Array, Array, Array]:
+    """Deviance, position (d,), residuals (n,) and weights (n,) where reweighted least squares ends."""
+    position, unit, count = start, np.empty(len(start)), len(range_m)
+    residual, weights, total = np.empty(count), np.ones(count), 0.0
+    for _ in range(_REWEIGHTINGS):
+        position = weighted_lm(position, anchors_m, range_m, weights, height_m)
+        total = 0.0
+        for number in range(count):
+            residual[number] = range_m[number] - direction(position, anchors_m[number], height_m, unit)
+            deviance, weights[number] = _law(residual[number], sd_m, scale_m)
+            total += deviance
+    return total, position, residual, weights
 
 
-def _deviance(residual: Array, sd_m: float, scale_m: float) -> Array:
-    """Twice the negative logarithm of the one-sided law, but for a constant: linear where the range is too long."""
-    z = residual / sd_m
-    knee = max(2.0, sd_m / scale_m)
-    return np.where(z > knee, knee**2 + 2.0 * (residual - knee * sd_m) / scale_m, z**2)
+@njit(cache=True)
+def _law(residual_m: float, sd_m: float, scale_m: float) -> tuple[float, float]:
+    """Deviance and weight of a residual: squared, but linear where the range is too long by more than its noise.
 
-
-def _weights(residual: Array, sd_m: float, scale_m: float) -> Array:
-    """Weights that make least squares descend that deviance."""
-    z = np.abs(residual) / sd_m
-    return np.where(residual > 2.0 * sd_m, np.sqrt(_deviance(residual, sd_m, scale_m)) / np.maximum(z, 1.0) ** 2, 1.0)
+    The weight falls faster than the deviance's slope would have it, which finds the minimum a little more often.
+    """
+    z, knee = residual_m / sd_m, max(_KNEE_SDS, sd_m / scale_m)
+    deviance = z * z if z <= knee else knee * knee + 2.0 * (residual_m - knee * sd_m) / scale_m
+    return deviance, 1.0 if z <= _KNEE_SDS else math.sqrt(deviance) / (z * z)

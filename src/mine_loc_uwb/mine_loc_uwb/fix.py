@@ -36,6 +36,6 @@ class Fix:
     gdop: float
 
 
-def no_fix(status: FixStatus, dimensions: int, ranges: int, gdop: float = np.inf) -> Fix:
+def no_fix(status: FixStatus, dimensions: int, gdop: float = np.inf) -> Fix:
     """The answer where there is no position."""
-    return Fix(status, np.full(3, np.nan), np.full((3, 3), np.nan), dimensions, ranges, np.nan, gdop)
+    return Fix(status, np.full(3, np.nan), np.full((3, 3), np.nan), dimensions, 0, np.nan, gdop)

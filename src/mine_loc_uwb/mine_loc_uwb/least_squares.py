@@ -30,7 +30,7 @@ def solve(
     dimensions = 3 if height_m is None else 2
     n = len(ranges_m)
     if n < dimensions + 1:
-        return no_fix(FixStatus.TOO_FEW_RANGES, dimensions, n)
+        return no_fix(FixStatus.TOO_FEW_RANGES, dimensions)
     centre = anchors_m.mean(axis=0)  # keeps the squares small where coordinates are in the thousands
     nodes = (anchors_m - centre)[:, :dimensions]
     squares = ranges_m**2
@@ -39,7 +39,7 @@ def solve(
         squares = np.maximum(squares - (anchors_m[:, 2] - height_m) ** 2, 0.0)
     A = 2.0 * (nodes[:-1] - nodes[-1])
     if np.linalg.matrix_rank(A, tol=_RANK_TOLERANCE * max(1.0, float(np.abs(A).max()))) < dimensions:
-        return no_fix(FixStatus.DEGENERATE, dimensions, n)
+        return no_fix(FixStatus.DEGENERATE, dimensions)
     r2 = squares - np.sum(nodes**2, axis=1)
     inverse = np.linalg.pinv(A)
     b = r2[-1] - r2[:-1]
@@ -91,10 +91,10 @@ def _judge(anchors_m: Array, ranges_m: Array, position: Array, solved_covariance
     J = (offsets / distances[:, None])[:, :dimensions]
     information = J.T @ J
     if np.linalg.cond(information) > 1.0 / np.finfo(float).eps:
-        return no_fix(FixStatus.DEGENERATE, dimensions, len(ranges_m))
+        return no_fix(FixStatus.DEGENERATE, dimensions)
     gdop = float(np.sqrt(np.trace(np.linalg.inv(information))))
     if gdop > max_gdop:
-        return no_fix(FixStatus.DEGENERATE, dimensions, len(ranges_m), gdop)
+        return no_fix(FixStatus.DEGENERATE, dimensions, gdop)
     residuals = ranges_m - distances
     rms = float(np.sqrt(np.mean(residuals**2)))
     covariance = np.zeros((3, 3))

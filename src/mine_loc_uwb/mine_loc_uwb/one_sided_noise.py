@@ -42,7 +42,7 @@ def score(
     explains. These are the terms of Masreliez' filter for non-Gaussian measurement noise (IEEE TAC 20:107, 1975).
     """
     p, slope = nlos_probability, -error_m / variance_m2
-    gauss = math.exp(0.5 * error_m * slope) / (_ROOT_2_PI * math.sqrt(variance_m2))
+    gauss = normal_density(error_m, variance_m2)
     gauss_1, gauss_2 = slope * gauss, (slope * slope - 1.0 / variance_m2) * gauss
     excess = excess_density(error_m, variance_m2, scale_m)
     excess_1 = (gauss - excess) / scale_m
@@ -60,8 +60,7 @@ def deviance(error_m: float, variance_m2: float, nlos_probability: float, scale_
 
     0 for errors that are likelier than none, as those are that an obstruction explains best.
     """
-    p, spread = nlos_probability, math.sqrt(variance_m2)
-    at_zero = (1.0 - p) / (_ROOT_2_PI * spread) + p * excess_density(0.0, variance_m2, scale_m)
-    here = (1.0 - p) * math.exp(-0.5 * error_m * error_m / variance_m2) / (_ROOT_2_PI * spread)
-    here += p * excess_density(error_m, variance_m2, scale_m)
+    p = nlos_probability
+    at_zero = (1.0 - p) * normal_density(0.0, variance_m2) + p * excess_density(0.0, variance_m2, scale_m)
+    here = (1.0 - p) * normal_density(error_m, variance_m2) + p * excess_density(error_m, variance_m2, scale_m)
     return max(2.0 * math.log(at_zero / here), 0.0) if here > 0.0 else math.inf

@@ -91,7 +91,7 @@ class ParticleFilter:
         p, count = self.parameters, len(measurements)
         if count <= measurements.shared_offset:
             self._particles = np.empty((0, 0, 3))
-            return self._unused(no_fix(FixStatus.TOO_FEW_RANGES, dimensions, count), count, Reason.NOT_INITIALISED)
+            return self._unused(no_fix(FixStatus.TOO_FEW_RANGES, dimensions), count, Reason.NOT_INITIALISED)
         fix = self._one_blink(measurements)
         if fix.status is FixStatus.OK:
             self._begin_at(fix, measurements)
@@ -243,7 +243,7 @@ class ParticleFilter:
         limit_m = p.max_gdop * self._arrival_sd_m()
         self._settled = self._settled or float(np.trace(covariance)) <= limit_m**2
         if not self._settled:
-            return no_fix(FixStatus.DEGENERATE, dimensions, used, spread)
+            return no_fix(FixStatus.DEGENERATE, dimensions, spread)
         residual = measurements.range_m - np.linalg.norm(position_m - measurements.anchors_m, axis=1)
         if measurements.shared_offset and len(residual):
             residual -= residual.mean()

@@ -30,6 +30,8 @@ Ids = npt.NDArray[np.uint64]
 Slots = npt.NDArray[np.int64]
 _REASON = {kernel.ACCEPTED: Reason.ACCEPTED, kernel.GATE: Reason.GATE, kernel.KINEMATIC: Reason.KINEMATIC}
 _MOST_LINKS = 16
+_CONTEST = 3
+"""Of so many ranges half must be believed, or none is: a few that are wrong alike would drag the track."""
 _LONGEST_DOUBT_STEP_S = 0.5
 """A silence is not doubt: one round after it adds no more than this."""
 _COASTED_S, _WIDE_M = 1.0, 1.0
@@ -115,6 +117,7 @@ class RobustTracker:
         slots = self._slots_of(measurements.anchor_ids)
         codes, deviances, quality = np.empty(len(slots), np.int64), np.empty(len(slots)), np.empty(3)
         offset_unknown = int(measurements.shared_offset and len(slots) > 0)
+        before = self._x.copy(), self._P.copy(), self._link_nlos.copy()
         kernel.take_round(
             self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
             measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
@@ -123,6 +126,11 @@ class RobustTracker:
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
         reasons = tuple([_REASON[code] for code in codes.tolist()])
+        if 2.0 * quality[0] < len(codes) and len(codes) >= _CONTEST:
+            self._x, self._P, self._link_nlos = before
+            kernel.predict(self._x, self._P, measurements.dimensions, gone_s, self._noise)
+            quality[:] = 0.0, math.nan, math.inf
+            reasons = tuple([Reason.AMBIGUOUS if reason is Reason.ACCEPTED else reason for reason in reasons])
         solution = Solution(self._fix(measurements, quality), reasons, deviances, self._gate)
         return self._settle_doubt(measurements, solution, gone_s)
 
@@ -188,11 +196,11 @@ class RobustTracker:
         count, dimensions = len(measurements), measurements.dimensions
         unknown = np.full(count, math.nan)
         if count < dimensions + measurements.shared_offset:
-            fix = no_fix(FixStatus.TOO_FEW_RANGES, dimensions, count)
+            fix = no_fix(FixStatus.TOO_FEW_RANGES, dimensions)
             return Solution(fix, (Reason.NOT_INITIALISED,) * count, unknown, self._gate)
         found = self._consensus(measurements)
         if found is None or math.sqrt(np.trace(found.covariance_m2)) > self._settings.max_start_sd_m:
-            fix = no_fix(FixStatus.DEGENERATE, dimensions, count)
+            fix = no_fix(FixStatus.DEGENERATE, dimensions)
             return Solution(fix, (Reason.DEGENERATE,) * count, unknown, self._gate)
         return self._begin_at(found, measurements)
 

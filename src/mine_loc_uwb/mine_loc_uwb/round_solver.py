@@ -10,7 +10,7 @@ import numpy as np
 from mine_loc_core.site import Anchor
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_uwb.fix import Fix, FixStatus, no_fix
+from mine_loc_uwb.fix import Fix
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.parameters import UwbSolverParameters
 from mine_loc_uwb.range_checks import RepeatedValues, impossible, stamp_reason
@@ -80,13 +80,16 @@ class RoundSolver:
 
     def solve(
         self, tag_id: int, stamp_ns: int, now_ns: int, ranges: Sequence[MeasuredRange], height_m: float | None
-    ) -> tuple[Fix, tuple[Verdict, ...]]:
-        """Position of one tag from a ranging round, and one verdict a range, in their order."""
+    ) -> tuple[Fix | None, tuple[Verdict, ...]]:
+        """Position of one tag from a ranging round, and one verdict a range, in their order.
+
+        A round whose stamp does not follow the last one has no position: output stamps never go back.
+        """
         return self._solve(tag_id, stamp_ns, now_ns, ranges, height_m, Source.RANGE)
 
     def solve_blink(
         self, tag_id: int, stamp_ns: int, now_ns: int, arrivals: Sequence[MeasuredRange], height_m: float | None
-    ) -> tuple[Fix, tuple[Verdict, ...]]:
+    ) -> tuple[Fix | None, tuple[Verdict, ...]]:
         """Position of one tag from the arrivals of a blink, the reference anchor's being 0 (see `Measurements`)."""
         return self._solve(tag_id, stamp_ns, now_ns, arrivals, height_m, Source.TDOA)
 
@@ -118,12 +121,11 @@ class RoundSolver:
         items: Sequence[MeasuredRange],
         height_m: float | None,
         source: Source,
-    ) -> tuple[Fix, tuple[Verdict, ...]]:
+    ) -> tuple[Fix | None, tuple[Verdict, ...]]:
         tag = self._tag(tag_id, source)
         timely = stamp_reason(stamp_ns, tag.last_ns, now_ns)
         if timely is not Reason.ACCEPTED:
-            fix = no_fix(FixStatus.TOO_FEW_RANGES, 3 if height_m is None else 2, 0)
-            return fix, tuple(Verdict(source, item.anchor_id, timely) for item in items)
+            return None, tuple(Verdict(source, item.anchor_id, timely) for item in items)
         tag.last_ns = stamp_ns
         reasons = self._checked(tag, items, source)
         used = [number for number, reason in enumerate(reasons) if reason is Reason.ACCEPTED]

@@ -61,18 +61,18 @@ def solve_blink(
     dimensions = 3 if measurements.height_m is None else 2
     count = len(measurements)
     if count < dimensions + 1:
-        return no_fix(FixStatus.TOO_FEW_RANGES, dimensions, count), Reason.DEGENERATE
+        return no_fix(FixStatus.TOO_FEW_RANGES, dimensions), Reason.DEGENERATE
     blink = Blink.of(measurements, parameters, last, dimensions)
     spread = np.linalg.svd(blink.node_m[1:], compute_uv=False)
     if spread[-1] <= _RANK_TOLERANCE * max(1.0, spread[0]):
-        return no_fix(FixStatus.DEGENERATE, dimensions, count), Reason.DEGENERATE
+        return no_fix(FixStatus.DEGENERATE, dimensions), Reason.DEGENERATE
     places = [_polished(blink, _joined(blink))] if blink.has_range else []
     places += [place for place in _closed(blink) if not places or blink.apart(place, places[0])]
     if not places:
-        return no_fix(FixStatus.DIVERGED, dimensions, count), Reason.INVALID
+        return no_fix(FixStatus.DIVERGED, dimensions), Reason.INVALID
     best, decided = _choose(blink, places)
     if not decided:
-        return no_fix(FixStatus.DEGENERATE, dimensions, count), Reason.AMBIGUOUS
+        return no_fix(FixStatus.DEGENERATE, dimensions), Reason.AMBIGUOUS
     return _judge(blink, best, measurements, parameters.max_gdop)
 
 
@@ -170,14 +170,14 @@ def _judge(blink: Blink, place_m: Array, measurements: Measurements, max_gdop: f
     count, dimensions = blink.node_m.shape
     information = blink.information(place_m)
     if np.linalg.cond(information) > 1.0 / np.finfo(float).eps:
-        return no_fix(FixStatus.DEGENERATE, dimensions, count), Reason.DEGENERATE
+        return no_fix(FixStatus.DEGENERATE, dimensions), Reason.DEGENERATE
     solved = np.linalg.inv(information)
     gdop = float(np.sqrt(np.trace(solved) / blink.variance_m2.mean()))
     redundancy = max(count - dimensions - (1 if measurements.shared_offset else 0), 1)
     if blink.contradiction(place_m) > chi2_quantile(_CONTRADICTION, redundancy):
-        return no_fix(FixStatus.DIVERGED, dimensions, count, gdop), Reason.INVALID
+        return no_fix(FixStatus.DIVERGED, dimensions, gdop), Reason.INVALID
     if gdop > max_gdop:
-        return no_fix(FixStatus.DEGENERATE, dimensions, count, gdop), Reason.DEGENERATE
+        return no_fix(FixStatus.DEGENERATE, dimensions, gdop), Reason.DEGENERATE
     residual = blink.residual_m(place_m)
     residual -= residual.mean() if measurements.shared_offset else 0.0
     position_m, covariance = measurements.anchors_m[0].copy(), np.zeros((3, 3))

@@ -151,7 +151,7 @@ def take_range(
         for other in range(d):
             along += unit[axis] * unit[other] * P[axis, other]
         spread += P[axis, axis]
-    curvature = 0.5 * max(spread - along, 0.0) / distance
+    curvature = math.sqrt(distance * distance + max(spread - along, 0.0)) - distance
     variance = gain[common] + gain[bias] + 2.0 * curvature * curvature + variance_m2
     for axis in range(d):
         variance += unit[axis] * (gain[axis] + since_s * gain[d + axis])
@@ -242,7 +242,7 @@ def take_round(
         todo[first] = False
         slot = slots[first]
         belief = _shifted(share + memory * (link_nlos[slot] - share), los_probability[first])
-        codes[first], deviances[first], link_nlos[slot] = ACCEPTED, 0.0, belief
+        codes[first], deviances[first] = ACCEPTED, 0.0
         open_offset(
             x, P, dimensions, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first], height_m,
             belief, _scale_m(level_dbm[first], noise), work,
@@ -252,10 +252,11 @@ def take_round(
         todo[number] = False
         slot = slots[number]
         belief = _shifted(link_nlos[slot], los_probability[number])
-        codes[number], deviances[number], link_nlos[slot] = take_range(
+        codes[number], deviances[number], nlos = take_range(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
             height_m, belief, _scale_m(level_dbm[number], noise), gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
+        link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number])  # the judgement taken out again
     if noise[LEVEL_SD] > 0.0:
         for number in range(len(range_m)):
             if codes[number] == ACCEPTED and not math.isnan(level_dbm[number]):

@@ -68,3 +68,15 @@ def test_as_many_ranges_as_coordinates_agree_somewhere_whatever_they_say_and_are
     lies = {liar: 7.0 + 5.0 * liar for liar in range(too_few, len(ROOM))}
     assert track.tracker._agreed_place(track.tag.round(track.at_s, excess=lies)) is None
     assert track.tracker._agreed_place(track.tag.round(track.at_s)) is not None
+
+
+def test_a_minority_of_ranges_does_not_drag_a_track_that_coasted_wide():
+    """One of three is believed by chance: it is AMBIGUOUS, nothing moves, and the spread goes on growing."""
+    track = hall_after_a_blackout(5.0)
+    spread_m = 0.0
+    for _ in range(8):
+        solution = track.round(only=[0, 1, 2], excess=track.pretending((47.0, 32.0, 1.0), [0, 1, 2]))
+        assert Reason.ACCEPTED not in solution.reasons or solution.fix.ranges_used >= 2
+        assert track.error_m(solution) < 3.0 * sd_m(solution.fix)
+        assert sd_m(solution.fix) > spread_m or solution.fix.ranges_used >= 2
+        spread_m = sd_m(solution.fix)

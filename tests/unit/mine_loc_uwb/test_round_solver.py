@@ -154,7 +154,7 @@ ANY_RANGE = st.builds(
 
 
 @pytest.mark.parametrize("method", RANGE_METHODS)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     st.dictionaries(st.integers(1, 8), st.tuples(*[st.floats(-500.0, 500.0)] * 3), max_size=8),
     st.lists(st.lists(ANY_RANGE, max_size=12), min_size=1, max_size=4),

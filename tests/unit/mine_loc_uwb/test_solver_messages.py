@@ -22,9 +22,10 @@ def test_a_round_s_ranges_keep_their_order_and_what_is_known_of_them():
                 range_variance=0.04,
                 stamp_offset_ns=-1_500_000,
                 los_probability=0.25,
+                los_state=UwbRange.AMBIGUOUS,
                 receive_power=-80.5,
             ),
-            UwbRange(anchor_id=3, range=math.nan, los_probability=math.nan, receive_power=math.nan),
+            UwbRange(anchor_id=3, range=math.nan, receive_power=math.nan),  # los_state and probability never set
         ]
     )
     first, second = measured_ranges(array)
@@ -47,6 +48,17 @@ def test_the_arrivals_of_a_blink_begin_with_the_reference_at_nothing():
     ]
     assert {item.variance_m2 for item in arrivals} == {0.0225}
     assert all(math.isnan(item.los_probability) for item in arrivals)
+
+
+def test_a_difference_to_another_reference_is_no_arrival_and_a_variance_of_its_own_counts():
+    array = TdoaArray()
+    array.differences = [
+        TdoaDifference(anchor_id=2, reference_anchor_id=1, range_difference=-3.5, variance=0.5),
+        TdoaDifference(anchor_id=3, reference_anchor_id=2, range_difference=4.0),
+    ]
+    _, second, third = measured_arrivals(array, 0.0225)
+    assert (second.variance_m2, third.variance_m2) == (0.5, 0.0225)
+    assert math.isnan(third.range_m)
 
 
 def test_a_blink_that_one_anchor_heard_has_no_arrivals():
@@ -76,10 +88,10 @@ def test_a_fix_becomes_a_pose_of_the_round_s_instant_whose_orientation_is_unknow
 
 
 def test_no_fix_becomes_a_pose_without_a_position_that_says_so():
-    pose = to_pose(no_fix(FixStatus.DEGENERATE, 2, 300), array(), "map", "least_squares", 300)
+    pose = to_pose(no_fix(FixStatus.DEGENERATE, 2), array(), "map", "least_squares", 300)
     assert pose.status == UwbPose.DEGENERATE
     assert math.isnan(pose.pose.pose.position.x)
-    assert (pose.ranges_used, pose.ranges_rejected) == (255, 255)
+    assert (pose.ranges_used, pose.ranges_rejected) == (0, 255)
 
 
 @pytest.mark.parametrize("status", FixStatus)

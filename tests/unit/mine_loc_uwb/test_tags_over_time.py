@@ -10,7 +10,6 @@ from uwb_rounds import NOW_NS, PLACES, Rounds, noisy, ranges, reasons, solver
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason
 from mine_loc_uwb import round_solver
-from mine_loc_uwb.fix import FixStatus
 from mine_loc_uwb.parameters import RANGE_METHODS
 from mine_loc_uwb.round_solver import MeasuredRange
 
@@ -21,7 +20,7 @@ def test_a_stamp_from_the_future_is_refused_and_does_not_lock_out_the_next_good_
     subject = solver()
     fix, verdicts = subject.solve(7, NOW_NS + 10 * NS_PER_S, NOW_NS, ranges(), 1.0)
     assert set(reasons(verdicts)) == {Reason.FUTURE}
-    assert fix.status is not FixStatus.OK
+    assert fix is None
     assert set(reasons(subject.solve(7, NOW_NS, NOW_NS, ranges(), 1.0)[1])) == {Reason.ACCEPTED}
 
 
@@ -35,7 +34,7 @@ def test_a_repeated_or_backward_stamp_is_refused_and_changes_nothing(method, lat
         subject.solve(7, NOW_NS, NOW_NS, ranges(), 1.0)
     fix, verdicts = subjects[0].solve(7, NOW_NS + later_ns, NOW_NS, ranges(tag=(50.0, 40.0, 1.0)), 1.0)
     assert set(reasons(verdicts)) == {reason}
-    assert np.isnan(fix.position_m).all()
+    assert fix is None
     untroubled, troubled = (s.solve(7, NOW_NS + 10**8, NOW_NS + 10**8, ranges(), 1.0)[0] for s in subjects)
     assert troubled.position_m.tolist() == untroubled.position_m.tolist()
 

@@ -1,7 +1,9 @@
 """Messages to what the solvers take, and their fixes to messages."""
 
+import math
+
 from geometry_msgs.msg import PoseWithCovariance
-from mine_loc_interfaces.msg import TdoaArray, UwbPose, UwbRangeArray
+from mine_loc_interfaces.msg import TdoaArray, UwbPose, UwbRange, UwbRangeArray
 
 from mine_loc_core.nodes.conversions import to_point
 from mine_loc_uwb.fix import Fix
@@ -16,7 +18,7 @@ def measured_ranges(array: UwbRangeArray) -> list[MeasuredRange]:
             item.range,
             item.range_variance,
             item.stamp_offset_ns,
-            item.los_probability,
+            math.nan if item.los_state == UwbRange.LOS_UNKNOWN else item.los_probability,
             item.receive_power,
         )
         for item in array.ranges
@@ -24,16 +26,23 @@ def measured_ranges(array: UwbRangeArray) -> list[MeasuredRange]:
 
 
 def measured_arrivals(array: TdoaArray, variance_m2: float) -> list[MeasuredRange]:
-    """The arrivals of a blink: the reference anchor's at 0, then the others' differences to it."""
+    """The arrivals of a blink: the reference anchor's at 0, then the others' differences to it.
+
+    `variance_m2` is that of arrivals whose own is unknown. A difference to another reference is no arrival: NaN.
+    """
     if not array.differences:
         return []
-    reference = MeasuredRange(
-        array.differences[0].reference_anchor_id, 0.0, variance_m2, receive_power_dbm=array.reference_receive_power
-    )
+    reference_id = array.differences[0].reference_anchor_id
+    reference = MeasuredRange(reference_id, 0.0, variance_m2, receive_power_dbm=array.reference_receive_power)
     return [reference] + [
-        MeasuredRange(item.anchor_id, item.range_difference, variance_m2, receive_power_dbm=item.receive_power)
+        MeasuredRange(
+            item.anchor_id,
+            item.range_difference if item.reference_anchor_id == reference_id else math.nan,
+            item.variance or variance_m2,
+            receive_power_dbm=item.receive_power,
+        )
         for item in array.differences
-        if item.anchor_id != item.reference_anchor_id == reference.anchor_id
+        if item.anchor_id != reference_id
     ]
 
 

@@ -111,13 +111,16 @@ class UwbSolver(NodeBase):
         stamp_ns = to_stamp_ns(state.header.stamp)
         self._solver.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
 
-    def _publish(self, fix: Fix, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str) -> None:
+    def _publish(
+        self, fix: Fix | None, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str
+    ) -> None:
         self._heard_s[array.tag_id] = time.monotonic()
         self._rounds += 1
-        self._fixes += fix.status is FixStatus.OK
         refused = [verdict.reason.name.lower() for verdict in verdicts if not verdict.accepted]
         self._refused.update(refused)
-        self._poses.publish(to_pose(fix, array, self._frame.name, method, len(refused)))
+        if fix is not None:
+            self._fixes += fix.status is FixStatus.OK
+            self._poses.publish(to_pose(fix, array, self._frame.name, method, len(refused)))
         self._verdicts.publish(to_verdict_array(verdicts, array.header.stamp, self._frame.name, tag_id=array.tag_id))
 
     def _height_m(self, tag_id: int) -> float | None:
