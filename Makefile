@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim lock clean
+.PHONY: help setup demo test check nightly bench-sim bench-los lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -30,6 +30,9 @@ nightly: setup   ## ten million random bytes for the decoders, ten minutes of te
 
 bench-sim: setup ## the simulator against its models and real data (bench/results/sim.json)
 	@$(run) python bench/sim.py
+
+bench-los: setup ## the LOS/NLOS classifier on placements and scenes it never saw (bench/results/los.json)
+	@$(run) python bench/los.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

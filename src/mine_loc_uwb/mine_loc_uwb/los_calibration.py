@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-_LEAST, _MOST = 0.5, 5.0
+_LEAST, _MOST = 1.0, 5.0
+"""Never below 1: with few placements held out, those that fool every network are missing by chance, and it must not make
+the others sound surer."""
 
 
 def fit_temperature(logits: NDArray[np.float64], los: NDArray[np.bool_], weight: NDArray[np.float64]) -> float:

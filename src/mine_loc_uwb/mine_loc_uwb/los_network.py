@@ -1,51 +1,56 @@
 """The CNN-LSTM of paper A for the four classes of a link, beside a cautious reading of the powers.
 
-Whether there is a line of sight is a sum of evidence: what the powers say against free space, each with a weight that
-cannot turn its sign, and what the network reads from the profile. Which of the two NLOS and of the two LOS classes it is
+Whether there is a line of sight is a sum of evidence (`los_evidence`) and of what the network reads from the profile. Which of the two NLOS and of the two LOS classes it is
 follows from the network alone. So labels of two or three classes train the parts they inform.
 """
 
 import torch
 from torch import Tensor, nn
 
+from mine_loc_uwb import los_evidence as evidence
 from mine_loc_uwb.cir_input import CHANNELS, EDGE_PER_TAP, EDGE_TAPS, SIDE_NAMES
+from mine_loc_uwb.los_evidence import EvidenceWeights
 
 CLASSES = 4
 _FEATURES = len(SIDE_NAMES)
-_MEDIANS = {name: _FEATURES + number for number, name in enumerate(SIDE_NAMES)}
-_WIDTH, _HIDDEN, _EDGE, _SIDE = 16, 24, 16, 24
+_WIDTH, _HIDDEN, _EDGE, _SIDE = 24, 32, 24, 32
 _CLIP = 2.5
 _OUTPUTS = 3  # LOS, class 1 of NLOS, class 3 of LOS
 
 
 class Evidence(nn.Module):
-    """Monotone logit of a line of sight from the powers of the last second: more power never speaks against it.
+    """Logit of a line of sight from the powers of the last second; see `los_evidence`."""
 
-    Squashed, since a deficit of ten decibels says no more than one of four. With a range, power and first-path power
-    are held against free space; without one the noise a symbol is the level meter that automatic gain leaves uncompressed.
-    """
+    with_range: Tensor
+    without_range: Tensor
 
     def __init__(self) -> None:
         super().__init__()
-        self.weight = nn.Parameter(torch.full((2, 3), 0.5))
-        self.bias = nn.Parameter(torch.zeros(2))
-        self.register_buffer("noise_mean", torch.zeros(1))
-        self.register_buffer("noise_scale", torch.ones(1))
+        self.register_buffer("with_range", torch.zeros(3))
+        self.register_buffer("without_range", torch.zeros(2))
+
+    def set(self, weights: EvidenceWeights) -> None:
+        """Take over fitted weights."""
+        self.with_range.copy_(torch.tensor(weights.with_range))
+        self.without_range.copy_(torch.tensor(weights.without_range))
 
     def forward(self, side: Tensor) -> Tensor:
-        """Logits (n,) of side features (n, 2 f); 0 where nothing is known."""
-        power_db = side[:, _MEDIANS["receive_power_against_free_space_db"]]
-        first_db = side[:, _MEDIANS["first_path_power_against_free_space_db"]]
-        noise = (side[:, _MEDIANS["log_noise_per_symbol"]] - self.noise_mean) / self.noise_scale
-        seen = torch.stack([torch.tanh(power_db / 2.0), torch.tanh(first_db / 4.0 + 1.5), noise.clamp(-_CLIP, _CLIP)], 1)
-        regime = power_db.isnan().long()
-        known = ~seen.isnan().all(dim=1)
-        sums = (seen.nan_to_num(0.0) * nn.functional.softplus(self.weight)[regime]).sum(dim=1)
-        return torch.where(known, sums + self.bias[regime], torch.zeros_like(sums))
+        """Logits (n,) of side features (n, 2 f); NaN where nothing is known."""
+        power = torch.tanh(side[:, evidence.POWER] / evidence.POWER_SCALE_DB)
+        first = torch.tanh((side[:, evidence.FIRST_POWER] - evidence.FIRST_MIDDLE_DB) / evidence.FIRST_SCALE_DB)
+        noise = (side[:, evidence.NOISE] - evidence.NOISE_MIDDLE) / evidence.NOISE_SCALE
+        a, b, c = self.with_range
+        d, e = self.without_range
+        ranged = a * power + b * first + c
+        return torch.where(ranged.isnan(), d * noise.clamp(-evidence.NOISE_MOST, evidence.NOISE_MOST) + e, ranged)
 
 
 class LosNetwork(nn.Module):
     """Logits of the four classes from profile, leading edge and side features."""
+
+    side_mean: Tensor
+    side_scale: Tensor
+    temperature: Tensor
 
     def __init__(self, dropout: float = 0.3) -> None:
         super().__init__()
@@ -72,9 +77,6 @@ class LosNetwork(nn.Module):
         spread = (((side - mean).nan_to_num(0.0) ** 2).sum(dim=0) / count).sqrt()
         self.side_mean.copy_(mean)
         self.side_scale.copy_(torch.where(spread > 1e-3, spread, torch.ones_like(spread)))
-        noise = _MEDIANS["log_noise_per_symbol"]
-        self.evidence.noise_mean.copy_(self.side_mean[noise])
-        self.evidence.noise_scale.copy_(self.side_scale[noise])
 
     def read(self, profile: Tensor, edge: Tensor, side: Tensor) -> Tensor:
         """Say what the network reads beside the evidence: (n, 3) logits of LOS, of 1 in NLOS and of 3 in LOS."""
@@ -90,8 +92,8 @@ class LosNetwork(nn.Module):
 
     def judge(self, read: Tensor, side: Tensor) -> Tensor:
         """Add the evidence to what was read (n, 3): log-probabilities (n, 4)."""
-        regime = side[:, _MEDIANS["receive_power_against_free_space_db"]].isnan().long()
-        los = (self.evidence(side) + read[:, 0]) / self.temperature[regime]
+        without_range = side[:, evidence.POWER].isnan().long()
+        los = (self.evidence(side).nan_to_num(0.0) + read[:, 0]) / self.temperature[without_range]
         return class_log_probability(torch.cat([los[:, None], read[:, 1:]], dim=1))
 
 

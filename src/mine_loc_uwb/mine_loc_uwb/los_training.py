@@ -5,7 +5,7 @@ the training set (`select`); the network itself is then trained on all of them (
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -15,81 +15,49 @@ from torch import Tensor
 from mine_loc_uwb.cir_input import LEVEL_FEATURES, RANGE_FEATURES, SIDE_NAMES, LosInput
 from mine_loc_uwb.los_augmentation import augmented, without
 from mine_loc_uwb.los_calibration import fit_temperature
+from mine_loc_uwb.los_evidence import fit_evidence
 from mine_loc_uwb.los_network import LosNetwork
+from mine_loc_uwb.training_set import Sampler, TrainingSet, balanced_weights
 
 _FEATURES = len(SIDE_NAMES)
 Progress = Callable[[int], None]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TrainingSet:
-    """`n` frames with the classes that their labels allow, (n, 4), and their placements, (n,)."""
-
-    input: LosInput  # side features with history
-    allowed: NDArray[np.bool_]
-    placement: NDArray[np.int64]
-
-    def take(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "TrainingSet":
-        """Only some frames."""
-        return TrainingSet(self.input.take(which), self.allowed[which], self.placement[which])
-
-    @property
-    def los(self) -> NDArray[np.bool_]:
-        """Whether the label says line of sight, (n,)."""
-        return self.allowed[:, 2:].any(axis=1)
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingOptions:
     """How to train. The defaults suit tens of placements; thousands of simulated links take more steps and no caution."""
 
-    steps: int = 240
+    steps: int = 120
     check_every: int = 40
-    batch: int = 96
+    batch: int = 64
     learning_rate: float = 4e-3
     weight_decay: float = 1e-2
     caution: float = 8.0
     """Price of what the network adds to the evidence, over the number of placements it can have learnt it from."""
     auxiliary_weight: float = 0.5
+    hide_range: float = 0.5
+    hide_levels: float = 0.25
+    """Shares of frames whose range, or whose range and levels, are hidden, so that the network can do without."""
     augment: bool = True
     averaging: float = 0.97
     inner_folds: int = 3
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Selection:
     """What the inner folds chose."""
 
     steps: int
     temperature: tuple[float, float]
-    losses: list[float] = field(default_factory=list)
+    los_probability: tuple[NDArray[np.float64], NDArray[np.float64]]
+    """P(LOS) of the held-out frames at that step, calibrated: with the range and without it."""
+    los: NDArray[np.bool_]
+    placement: NDArray[np.int64]
 
 
 def to_tensors(given: LosInput) -> tuple[Tensor, Tensor, Tensor]:
     """Profile, edge and side of an input for the network."""
     return torch.from_numpy(given.profile), torch.from_numpy(given.edge), torch.from_numpy(given.side)
-
-
-class Sampler:
-    """Draws frames so that LOS and NLOS weigh the same, and all placements of a kind do."""
-
-    def __init__(self, data: TrainingSet, rng: np.random.Generator) -> None:
-        self._rng = rng
-        self._order = np.argsort(data.placement, kind="stable")
-        _, self._start, self._count = np.unique(data.placement[self._order], return_index=True, return_counts=True)
-        los = data.los[self._order[self._start]]
-        weight = np.where(los, 0.5 / max(los.sum(), 1), 0.5 / max((~los).sum(), 1))
-        self._weight = weight / weight.sum()
-
-    @property
-    def placements(self) -> int:
-        """Number of placements."""
-        return len(self._start)
-
-    def draw(self, count: int) -> NDArray[np.int64]:
-        """Numbers of `count` frames."""
-        place = self._rng.choice(len(self._start), count, p=self._weight)
-        return self._order[self._start[place] + (self._rng.random(count) * self._count[place]).astype(int)]
 
 
 def negative_log_likelihood(log_probability: Tensor, allowed: Tensor) -> Tensor:
@@ -112,6 +80,8 @@ def train(
     rng = np.random.default_rng(seed)
     network, averaged = LosNetwork(), LosNetwork()
     network.standardise(torch.from_numpy(data.input.side))
+    weights = balanced_weights(data.los, data.placement)
+    network.evidence.set(fit_evidence(data.input.side.astype(float), data.los, weights))
     averaged.load_state_dict(network.state_dict())
     optimiser = torch.optim.AdamW(network.parameters(), options.learning_rate, weight_decay=options.weight_decay)
     sampler, tensors, allowed = Sampler(data, rng), to_tensors(data.input), torch.from_numpy(data.allowed)
@@ -123,10 +93,12 @@ def train(
         batch = tuple(each[which] for each in tensors)
         if options.augment:
             batch = augmented(*batch)
-        batch = (batch[0], batch[1], without(batch[2], RANGE_FEATURES, share=0.5))
+        side = without(batch[2], RANGE_FEATURES, options.hide_range)
+        side = without(side, LEVEL_FEATURES, options.hide_levels)
+        batch = (batch[0], batch[1], side)
         read = network.read(*batch)
         loss = negative_log_likelihood(network.judge(read, batch[2]), allowed[which])
-        loss = loss + caution * (read[:, 0] ** 2).mean()
+        loss = loss + caution * (read[:, 0] ** 2 * network.evidence(side).isfinite()).mean()
         if others is not None:
             loss = loss + options.auxiliary_weight * others.loss(network, options.batch)
         optimiser.zero_grad()
@@ -220,15 +192,8 @@ def select(judged: list[HeldOut], options: TrainingOptions) -> Selection:
     losses = sum(np.logaddexp(0.0, -sign * logits) @ weight for logits in both)
     best = int(np.argmin(losses))
     warm = (fit_temperature(both[0][best], los, weight), fit_temperature(both[1][best], los, weight))
-    return Selection((best + 1) * options.check_every, warm, np.asarray(losses).tolist())
-
-
-def balanced_weights(los: NDArray[np.bool_], placement: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Weights (n,) of sum 1 by which both kinds weigh the same, and the placements of each."""
-    _, which, count = np.unique(placement, return_inverse=True, return_counts=True)
-    weight = 1.0 / count[which]
-    kinds = np.where(los, weight[los].sum() if los.any() else 1.0, weight[~los].sum() if (~los).any() else 1.0)
-    return np.asarray(weight / kinds / (weight / kinds).sum())
+    calm = [1.0 / (1.0 + np.exp(-logits[best] / warmth)) for logits, warmth in zip(both, warm, strict=True)]
+    return Selection((best + 1) * options.check_every, warm, (calm[0], calm[1]), los, placement)
 
 
 def _logit(probability: NDArray[np.float64]) -> NDArray[np.float64]:

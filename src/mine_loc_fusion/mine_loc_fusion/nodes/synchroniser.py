@@ -1,5 +1,6 @@
 """Time alignment: everything measured, as epochs of one person each, in order."""
 
+import math
 import sys
 from collections.abc import Hashable, Iterable
 from pathlib import Path
@@ -90,7 +91,8 @@ class SynchroniserNode(NodeBase):
             self._unknown_tags.clear()
 
     def _on_ranges(self, message: msg.UwbRangeArray) -> None:
-        self._on_tag(Kind.RANGES, message, message.seq, message.reporter_id, links=len(message.ranges))
+        measured = sum(math.isfinite(each.range_raw) for each in message.ranges)  # a failed exchange has no link state
+        self._on_tag(Kind.RANGES, message, message.seq, message.reporter_id, links=measured)
 
     def _on_tag(self, kind: Kind, message: Any, seq: int, source: Hashable = 0, links: int = 0) -> None:
         person = self._people.people.by_tag(message.tag_id)
