@@ -37,9 +37,7 @@ def features(
     window = np.take_along_axis(magnitude, columns, axis=1).astype(float)
     noise = np.sqrt((magnitude[:, 64:700].astype(float) ** 2).mean(axis=1))
     delays = delay_features(window, _BEFORE, floor - _BEFORE - first_path_index, noise)
-    return np.column_stack(
-        [receive_power_dbm - first_path_power_dbm, delays, np.log(symbols), receive_power_dbm]
-    )
+    return np.column_stack([receive_power_dbm - first_path_power_dbm, delays, np.log(symbols), receive_power_dbm])
 
 
 def read_real(folder: Path) -> Receptions:

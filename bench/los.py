@@ -1,10 +1,10 @@
 """The LOS/NLOS classifier against placements and scenes it has never seen: writes bench/results/los.json.
 
-`real`: leave-one-placement-out over the 27 placements of uwb_cirs_2018. Steps and temperature of each network come from
-inner folds over its training placements. `rf` is a random forest on the hand features of `cir_features` in the same
-folds, `rf_same_inputs` one on all the side features the network has, link history included. `real_no_range` are the same
-networks with the range hidden, `rf_no_range` forests without it. `sim_four_class`: trained on walks in one simulated mine,
-scored on walks of other people in another. Figures are means over seeds, with `_sd` beside each.
+`real`: leave-one-placement-out over the 27 placements of uwb_cirs_2018. Steps and temperature of each network come
+from inner folds over its training placements. `rf` is a random forest on the hand features of `cir_features` in the
+same folds, `rf_same_inputs` one on all side features the network has, link history included. `real_no_range` are the
+same networks with the range hidden, `rf_no_range` forests without it. `sim_four_class`: trained on walks in simulated
+mines, scored on walks of other people in another. Figures are means over seeds, with `_sd` beside each.
 """
 
 import argparse
@@ -198,7 +198,15 @@ def main() -> None:
             known.update(real(pool))
     arguments.json.parent.mkdir(parents=True, exist_ok=True)
     arguments.json.write_text(json.dumps(known, indent=2, sort_keys=True) + "\n")
-    print(json.dumps({k: {a: b for a, b in v.items() if a != "placements"} if isinstance(v, dict) else v for k, v in known.items()}, indent=2))
+    print(
+        json.dumps(
+            {
+                k: {a: b for a, b in v.items() if a != "placements"} if isinstance(v, dict) else v
+                for k, v in known.items()
+            },
+            indent=2,
+        )
+    )
 
 
 if __name__ == "__main__":

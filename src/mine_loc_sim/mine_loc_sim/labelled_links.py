@@ -1,7 +1,7 @@
 """Receptions over single links drawn without a scene: what a classifier can be trained on beside real ones.
 
-A third of the links is clear, a third crosses something, a third only goes round rock; half see the channels of industry
-(CM7 and CM8), half those of buildings.
+A third of the links is clear, a third crosses something, a third only goes round rock; half see the channels of
+industry (CM7 and CM8), half those of buildings.
 """
 
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ def _obstruction(count: int, rng: np.random.Generator) -> Obstruction:
     crossed, rock = kind == 1, kind == 2
     detour_m = np.where(crossed, rng.uniform(*CROSSED_DETOUR_M, count), 0.0)
     return Obstruction(
-        distance_m=np.exp(rng.uniform(*np.log(DISTANCE_M), count)),
+        distance_m=DISTANCE_M[0] * (DISTANCE_M[1] / DISTANCE_M[0]) ** rng.random(count),
         loss_db=np.where(crossed, rng.uniform(*CROSSED_LOSS_DB, count), rock * ROCK_LOSS_DB),
         delay_m=np.where(crossed, rng.uniform(*CROSSED_DELAY_M, count), 0.0),
         detour_m=np.where(rock, rng.uniform(*ROCK_DETOUR_M, count), detour_m),

@@ -120,7 +120,7 @@ def _edge(spectrum: NDArray[np.complex64]) -> Floats:
     longer[:, :half], longer[:, -half:] = spectrum[:, :half], spectrum[:, half:]
     first = (BEFORE - 2) * EDGE_PER_TAP
     fine = scipy.fft.ifft(longer, axis=1)[:, first : first + EDGE_TAPS * EDGE_PER_TAP]
-    return np.abs(fine) * np.float32(EDGE_PER_TAP)
+    return np.asarray(np.abs(fine) * np.float32(EDGE_PER_TAP))
 
 
 def _noise_counts(frames: CirFrames, first: NDArray[np.int64], raw: Floats) -> NDArray[np.float64]:
@@ -128,10 +128,10 @@ def _noise_counts(frames: CirFrames, first: NDArray[np.int64], raw: Floats) -> N
     quiet = int(first.min()) + BEFORE - _QUIET_TAPS
     if quiet >= _LEAST_QUIET:
         ahead = frames.samples[:, :quiet].astype(np.float32)
-        return np.maximum(np.hypot(ahead[..., 0], ahead[..., 1]).std(axis=1), 1.0)
+        return np.maximum(np.asarray(np.hypot(ahead[..., 0], ahead[..., 1]).std(axis=1), float), 1.0)
     few = np.hypot(raw[:, : BEFORE - 4, 0], raw[:, : BEFORE - 4, 1]).std(axis=1)
     register = frames.noise_std / _STD_NOISE_SHARE
-    return np.maximum(np.where(register > 0.0, register, few), 1.0)
+    return np.asarray(np.maximum(np.where(register > 0.0, register, few), 1.0))
 
 
 def _side(frames: CirFrames, window: Floats, fraction: Floats, noise: NDArray[np.float64]) -> Floats:

@@ -47,5 +47,8 @@ def _median(rows: Floats) -> Floats:
     ordered = np.sort(rows, axis=0)
     known = np.isfinite(rows).sum(axis=0)
     columns = np.arange(rows.shape[1])
-    lower, upper = ordered[np.maximum(known - 1, 0) // 2, columns], ordered[np.minimum(known // 2, len(rows) - 1), columns]
+    lower, upper = (
+        ordered[np.maximum(known - 1, 0) // 2, columns],
+        ordered[np.minimum(known // 2, len(rows) - 1), columns],
+    )
     return np.where(known > 0, 0.5 * (lower + upper), np.nan).astype(np.float32)

@@ -45,5 +45,3 @@ def without(side: Tensor, features: tuple[int, ...], share: float = 1.0) -> Tens
     hidden[[column + offset for column in features for offset in (0, _FEATURES)]] = True
     rows = torch.rand(len(side), 1) < share
     return side.masked_fill(hidden & rows, torch.nan)
-
-

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 _LEAST, _MOST = 1.0, 5.0
-"""Never below 1: with few placements held out, those that fool every network are missing by chance, and it must not make
-the others sound surer."""
+"""Never below 1: a placement that fools every network is missing from the others' folds when it is held out itself,
+and that must not make them sound surer."""
 
 
 def fit_temperature(logits: NDArray[np.float64], los: NDArray[np.bool_], weight: NDArray[np.float64]) -> float:

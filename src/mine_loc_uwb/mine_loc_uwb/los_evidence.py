@@ -1,8 +1,9 @@
 """What the powers of a link say about its line of sight: few numbers, so that few placements suffice to weigh them.
 
 With a measured range, the received power and the power of the first path are held against what free space would give
-(Friis): an obstacle costs decibels, a clear link of a building or gallery does not. Without one, the noise an accumulated
-symbol is the level meter: it grows with the signal, and automatic gain does not compress it as it does the power.
+(Friis): an obstacle costs decibels, a clear link of a building or gallery does not. Without one, the noise an
+accumulated symbol is the level meter: it grows with the signal, and automatic gain does not compress it as it does the
+power.
 Decibels are squashed, since a deficit of ten says no more than one of four; weights cannot turn their sign.
 """
 

@@ -81,7 +81,7 @@ def binary_measures(probability: Reals, los: Booleans, placement: NDArray[np.int
 
 
 def class_measures(said: NDArray[np.int64], true: NDArray[np.int64], classes: int) -> dict[str, Any]:
-    """Figures of classes 0 to `classes` - 1, (n,): recall and F1 are macro, `confusion` has a row for each true class."""
+    """Figures of classes 0 and on, (n,): recall and F1 are macro, `confusion` has a row for each true class."""
     confusion = np.zeros((classes, classes), int)
     np.add.at(confusion, (true, said), 1)
     right, truth, claims = np.diag(confusion), confusion.sum(axis=1), confusion.sum(axis=0)

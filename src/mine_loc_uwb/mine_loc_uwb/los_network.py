@@ -1,7 +1,8 @@
 """The CNN-LSTM of paper A for the four classes of a link, beside a cautious reading of the powers.
 
-Whether there is a line of sight is a sum of evidence (`los_evidence`) and of what the network reads from the profile. Which of the two NLOS and of the two LOS classes it is
-follows from the network alone. So labels of two or three classes train the parts they inform.
+Whether there is a line of sight is a sum of evidence (`los_evidence`) and of what the network reads from the profile.
+Which of the two NLOS and of the two LOS classes it is follows from the network alone. So labels of two or three classes
+train the parts they inform.
 """
 
 import torch
@@ -84,7 +85,8 @@ class LosNetwork(nn.Module):
         missing = scaled.isnan()
         known = torch.cat([scaled.nan_to_num(0.0).clamp(-_CLIP, _CLIP), missing.to(side.dtype)], dim=1)
         last = self.lstm(self.cnn(profile).transpose(1, 2))[1][0][-1]
-        return self.head(self.dropout(torch.cat([last, self.edge(edge), self.side(known)], dim=1)))
+        read: Tensor = self.head(self.dropout(torch.cat([last, self.edge(edge), self.side(known)], dim=1)))
+        return read
 
     def forward(self, profile: Tensor, edge: Tensor, side: Tensor) -> Tensor:
         """Log-probabilities (n, 4) of the classes, calibrated."""

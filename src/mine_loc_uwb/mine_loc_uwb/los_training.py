@@ -12,20 +12,20 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from mine_loc_uwb.cir_input import LEVEL_FEATURES, RANGE_FEATURES, SIDE_NAMES, LosInput
+from mine_loc_uwb.cir_input import LEVEL_FEATURES, RANGE_FEATURES, LosInput
 from mine_loc_uwb.los_augmentation import augmented, without
 from mine_loc_uwb.los_calibration import fit_temperature
 from mine_loc_uwb.los_evidence import fit_evidence
 from mine_loc_uwb.los_network import LosNetwork
 from mine_loc_uwb.training_set import Sampler, TrainingSet, balanced_weights
 
-_FEATURES = len(SIDE_NAMES)
+_CHUNK = 4096
 Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingOptions:
-    """How to train. The defaults suit tens of placements; thousands of simulated links take more steps and no caution."""
+    """How to train. The defaults suit tens of placements; thousands of links take more steps and no caution."""
 
     steps: int = 120
     check_every: int = 40
@@ -102,7 +102,7 @@ def train(
         if others is not None:
             loss = loss + options.auxiliary_weight * others.loss(network, options.batch)
         optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         optimiser.step()
         _average(averaged, network, min(options.averaging, step / (step + 10)))
         if progress is not None:
@@ -132,7 +132,8 @@ def _average(averaged: LosNetwork, network: LosNetwork, keep: float) -> None:
 @torch.no_grad()
 def log_probabilities(network: LosNetwork, given: LosInput) -> NDArray[np.float64]:
     """Class log-probabilities (n, 4) of a whole input."""
-    parts = [network(*(each.split(4096)[k] for each in to_tensors(given))) for k in range(-(-len(given) // 4096))]
+    chunks = [given.take(slice(first, first + _CHUNK)) for first in range(0, len(given), _CHUNK)]
+    parts = [network(*to_tensors(chunk)) for chunk in chunks]
     return np.concatenate([part.numpy() for part in parts]).astype(float)
 
 

@@ -13,7 +13,7 @@ _A_DB = {16: 113.77, 64: 121.74}
 _COMPRESSION_START_DBM = -88.0
 _COMPRESSION_SLOPE = {16: 2.3334, 64: 1.1667}
 _REPORTED_CEILING_DBM = -78.3
-"""Strongest level ever reported: median of the three strongest placements of uwb_cirs_2018 is -78.5, best frame -78.2."""
+"""Strongest level ever reported: median of the strongest placements of uwb_cirs_2018 is -78.5, best frame -78.2."""
 
 _TRANSMIT_POWER_DBM = -14.3
 """-41.3 dBm/MHz over 499.2 MHz: the legal limit, which DW1000 boards are set to; no antenna gain."""

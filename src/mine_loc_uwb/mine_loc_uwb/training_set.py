@@ -24,7 +24,7 @@ class TrainingSet:
     @property
     def los(self) -> NDArray[np.bool_]:
         """Whether the label says line of sight, (n,)."""
-        return self.allowed[:, 2:].any(axis=1)
+        return np.asarray(self.allowed[:, 2:].any(axis=1))
 
     @staticmethod
     def join(parts: Sequence["TrainingSet"]) -> "TrainingSet":
@@ -54,7 +54,7 @@ class Sampler:
     def draw(self, count: int) -> NDArray[np.int64]:
         """Numbers of `count` frames."""
         place = self._rng.choice(len(self._start), count, p=self._weight)
-        return self._order[self._start[place] + (self._rng.random(count) * self._count[place]).astype(int)]
+        return np.asarray(self._order[self._start[place] + (self._rng.random(count) * self._count[place]).astype(int)])
 
 
 def balanced_weights(los: NDArray[np.bool_], placement: NDArray[np.int64]) -> NDArray[np.float64]:

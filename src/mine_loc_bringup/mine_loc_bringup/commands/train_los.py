@@ -7,8 +7,8 @@ DATA is one of
   a bag      with uwb/cir, and labels on truth/link_state (mine-loc simulate --cir --bag writes one)
 
 Labels are LOS, NLOS, NDP NLOS, or a class 1 to 4. Frames of one placement (config, or link of a bag) are near copies:
-placements, not frames, are what more of helps. Simulated CM7, CM8 and CM4 links with all four classes train beside them;
-how long to train, and the calibration, come from folds over placements. An interrupted run goes on where it was.
+more placements help, more frames hardly. Simulated CM7, CM8 and CM4 links with all four classes train beside them; how
+long to train, and the calibration, come from folds over placements. An interrupted run goes on where it was.
 
 Examples:
   mine-loc train-los "$MINE_LOC_DATA/uwb_cirs_2018" --out build/los.safetensors
@@ -41,8 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     import torch  # noqa: PLC0415
 
     from mine_loc_bringup.los import train as runs  # noqa: PLC0415
-    from mine_loc_bringup.los.report import inner_figures  # noqa: PLC0415
     from mine_loc_bringup.los.recordings import read_recording  # noqa: PLC0415
+    from mine_loc_bringup.los.report import inner_figures  # noqa: PLC0415
     from mine_loc_uwb.labelled_frames import training_set  # noqa: PLC0415
     from mine_loc_uwb.los_model_file import save_model  # noqa: PLC0415
     from mine_loc_uwb.los_training import TrainingOptions  # noqa: PLC0415
@@ -54,7 +54,11 @@ def run(arguments: argparse.Namespace) -> int:
     if len(set(data.placement[data.los])) < options.inner_folds or data.los.all():
         raise ConfigurationError(f"data: too few placements; allowed: {options.inner_folds} or more LOS ones, and NLOS")
     auxiliary = None if arguments.no_simulated else runs.simulated_links(arguments.seed)
-    description = {"data": [runs.data_hash(path) for path in arguments.data], "seed": arguments.seed, "simulated": auxiliary is not None}
+    description = {
+        "data": [runs.data_hash(path) for path in arguments.data],
+        "seed": arguments.seed,
+        "simulated": auxiliary is not None,
+    }
     folder = runs.resume_folder(out, description)
     with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task("training", total=options.steps * runs.networks_to_train(options))

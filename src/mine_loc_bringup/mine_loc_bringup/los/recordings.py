@@ -29,7 +29,7 @@ def read_recording(path: Path) -> LabelledFrames:
     if path.is_file() and path.suffix.lower() == ".csv":
         return read_ewine(path)
     raise ConfigurationError(
-        f"{path}: no labelled recording; allowed: a folder with cir_iq.npz and frames.csv, a CSV with CIR0 and on, a bag"
+        f"{path}: no labelled recording; allowed: a folder with cir_iq.npz and frames.csv, an eWINE-style CSV, a bag"
     )
 
 
@@ -38,7 +38,9 @@ def read_folder(path: Path) -> LabelledFrames:
     rows, columns = _read_csv(path / "frames.csv")
     missing = [name for name in _REQUIRED if name not in columns]
     if missing:
-        raise ConfigurationError(f"{path / 'frames.csv'}: no column {missing[0]}; allowed: {', '.join(_REQUIRED)} needed")
+        raise ConfigurationError(
+            f"{path / 'frames.csv'}: no column {missing[0]}; allowed: {', '.join(_REQUIRED)} needed"
+        )
     samples = _samples(path / "cir_iq.npz", len(rows))
     config = [row["config"] for row in rows]
     placement = np.unique(config, return_inverse=True)[1]
@@ -102,7 +104,7 @@ def _samples(path: Path, count: int) -> NDArray[np.int16]:
         raise ConfigurationError(f"{path}: cir cannot be read ({error}); allowed: int16 (frames, taps, 2)") from None
     if samples.dtype != np.int16 or samples.ndim != 3 or samples.shape[2] != 2 or len(samples) != count:
         raise ConfigurationError(
-            f"{path}: cir is {samples.dtype} {samples.shape}; allowed: int16 ({count}, taps, 2), a frame a row of frames.csv"
+            f"{path}: cir is {samples.dtype} {samples.shape}; allowed: int16 ({count}, taps, 2), as frames.csv has rows"
         )
     return np.asarray(samples)
 

@@ -11,7 +11,7 @@ from mine_loc_uwb.los_measures import binary_measures, class_measures, reliabili
 from mine_loc_uwb.los_training import Selection
 
 mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 after the backend is chosen
+import matplotlib.pyplot as plt
 
 _CARD_FIGURES = ("accuracy", "balanced_accuracy", "placement_balanced_accuracy", "auc", "ece", "brier")
 
@@ -42,9 +42,10 @@ def reliability_plot(path: Path, probability: NDArray[np.float64], los: NDArray[
 def figures_of(
     log_probability: NDArray[np.float64], allowed: NDArray[np.bool_], placement: NDArray[np.int64]
 ) -> dict[str, Any]:
-    """Figures of class log-probabilities (n, 4): LOS against NLOS, and of the classes where every label is one class."""
+    """Figures of class log-probabilities (n, 4): LOS against NLOS, and of four classes where all labels name one."""
     probability = np.exp(log_probability)
-    figures = binary_measures(probability[:, 2:].sum(axis=1), allowed[:, 2:].any(axis=1), placement)
+    los = np.asarray(allowed[:, 2:].any(axis=1))
+    figures = binary_measures(probability[:, 2:].sum(axis=1), los, placement)
     if (allowed.sum(axis=1) == 1).all():
         figures["four_class"] = class_measures(probability.argmax(axis=1), allowed.argmax(axis=1), 4)
     return figures

@@ -85,7 +85,9 @@ class LosClassifier(NodeBase):
             frames = list(group)
             links = [(frame.tag_id, frame.anchor_id) for frame in frames]
             stamps_ns = [to_stamp_ns(frame.header.stamp) for frame in frames]
-            for frame, judged in zip(frames, self._judge_of.judge(to_cir_frames(frames), links, stamps_ns), strict=True):
+            for frame, judged in zip(
+                frames, self._judge_of.judge(to_cir_frames(frames), links, stamps_ns), strict=True
+            ):
                 self._judged += judged.refusal is Refusal.NOT
                 if judged.refusal is not Refusal.NOT:
                     self._refused[judged.refusal.name.lower()] += 1
