@@ -86,6 +86,8 @@ def refusals(frames: CirFrames) -> NDArray[np.int64]:
         return np.full(len(frames), int(Refusal.EMPTY))
     inside = (first >= 0) & (first + TAPS <= taps)
     found[~inside] = Refusal.TRUNCATED
+    silent = ~_window(frames.samples, np.where(inside, first, 0).astype(int) % max(taps - TAPS + 1, 1)).any(axis=(1, 2))
+    found[inside & silent] = Refusal.EMPTY
     extremes = np.stack([frames.samples.min(axis=(1, 2)), frames.samples.max(axis=(1, 2))]).astype(int)
     found[np.abs(extremes).max(axis=0) >= _RAIL] = Refusal.SATURATED
     position = frames.first_path_index - frames.start_index
@@ -99,7 +101,7 @@ def los_input(frames: CirFrames) -> LosInput:
     whole = np.floor(frames.first_path_index).astype(int)
     fraction = (frames.first_path_index - whole).astype(np.float32)
     first = whole - BEFORE - frames.start_index
-    raw = frames.samples[np.arange(len(frames))[:, None], first[:, None] + np.arange(TAPS)].astype(np.float32)
+    raw = _window(frames.samples, first).astype(np.float32)
     spectrum = scipy.fft.fft(raw.view(np.complex64)[..., 0], axis=1)
     turn = np.exp(2j * np.pi * scipy.fft.fftfreq(TAPS).astype(np.float32) * fraction[:, None]).astype(np.complex64)
     spectrum *= turn
@@ -111,6 +113,12 @@ def los_input(frames: CirFrames) -> LosInput:
     edge = _edge(spectrum) / peak
     side = _side(frames, np.hypot(raw[..., 0], raw[..., 1]), fraction, noise)
     return LosInput(profile, edge.astype(np.float32), side)
+
+
+def _window(samples: NDArray[np.int16], first: NDArray[np.int64]) -> NDArray[np.int16]:
+    """The taps from `first` (n,) on of samples (n, taps, 2): (n, TAPS, 2), or fewer if there are not so many."""
+    taps = np.arange(min(TAPS, samples.shape[1]))
+    return np.asarray(samples[np.arange(len(samples))[:, None], first[:, None] + taps])
 
 
 def _edge(spectrum: NDArray[np.complex64]) -> Floats:
@@ -128,7 +136,7 @@ def _noise_counts(frames: CirFrames, first: NDArray[np.int64], raw: Floats) -> N
     quiet = int(first.min()) + BEFORE - _QUIET_TAPS
     if quiet >= _LEAST_QUIET:
         ahead = frames.samples[:, :quiet].astype(np.float32)
-        return np.maximum(np.asarray(np.hypot(ahead[..., 0], ahead[..., 1]).std(axis=1), float), 1.0)
+        return np.asarray(np.maximum(np.hypot(ahead[..., 0], ahead[..., 1]).std(axis=1), 1.0), float)
     few = np.hypot(raw[:, : BEFORE - 4, 0], raw[:, : BEFORE - 4, 1]).std(axis=1)
     register = frames.noise_std / _STD_NOISE_SHARE
     return np.asarray(np.maximum(np.where(register > 0.0, register, few), 1.0))

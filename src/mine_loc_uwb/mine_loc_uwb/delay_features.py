@@ -33,7 +33,7 @@ def delay_features(window: Floats, before: int, offset: Floats, noise: Floats) -
             np.log(np.maximum(mean, 0.3)),
             np.log(np.maximum(spread, 0.3)),
             np.log1p(np.maximum(offset + window.argmax(axis=1), 0.0)),
-            np.log((squared * squared).mean(axis=1) / squared.mean(axis=1) ** 2),
+            np.log((squared * squared).mean(axis=1) / np.maximum(squared.mean(axis=1) ** 2, 1e-6) + 1e-6),
             np.log1p(np.maximum(offset + (window > 0.9 * peak[:, None]).argmax(axis=1), 0.0)),
             early,
             10.0 * np.log10(early + 1e-3),

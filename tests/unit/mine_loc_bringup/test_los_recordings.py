@@ -1,4 +1,4 @@
-"""Labelled recordings from a folder, an eWINE-style CSV and a simulated bag; training and scoring from the command line."""
+"""Labelled recordings from a folder, an eWINE-style CSV and a simulated bag; the commands that train and score."""
 
 import json
 import os

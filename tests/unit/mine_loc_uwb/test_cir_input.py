@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from los_samples import pulses
 
@@ -68,6 +68,27 @@ def test_what_is_not_known_is_nan_and_the_rest_is_there():
     assert los_input(frames).without_range().side[0, POWER] != 0.0
 
 
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 9.0), st.floats(0.0, 1100.0), st.sampled_from([0, 100, 128, 300]))
+def test_whatever_stands_in_an_accumulator_is_read_without_nan_or_refused(seed, log_counts, index, taps):
+    rng = np.random.default_rng(seed)
+    samples = (np.exp(log_counts) * rng.standard_normal((1, taps, 2)) * (rng.random((1, taps, 1)) < 0.3)).astype(
+        np.int16
+    )
+    columns = {
+        "samples": samples,
+        "start_index": np.array([700]),
+        "range_m": rng.choice([np.nan, -1.0, np.inf, 9.0], 1),
+    }
+    frames = pulses([index])
+    frames = type(frames)(**{name: getattr(frames, name) for name in frames.__dataclass_fields__} | columns)
+    if refusals(frames)[0] == Refusal.NOT:
+        found = los_input(frames)
+        assert np.isfinite(found.profile).all()
+        assert np.isfinite(found.edge).all()
+        assert not np.isinf(found.side).any()
+
+
 @pytest.mark.parametrize(
     ("columns", "reason"),
     [
@@ -79,6 +100,7 @@ def test_what_is_not_known_is_nan_and_the_rest_is_there():
         ({"samples": np.full((1, 1016, 2), 32767, np.int16)}, Refusal.SATURATED),
         ({"samples": np.full((1, 1016, 2), -32768, np.int16)}, Refusal.SATURATED),
         ({"samples": np.zeros((1, 1016, 2), np.int16)}, Refusal.EMPTY),
+        ({"samples": np.pad(np.ones((1, 9, 2), np.int16), ((0, 0), (0, 1007), (0, 0)))}, Refusal.EMPTY),
         ({"samples": np.zeros((1, 0, 2), np.int16)}, Refusal.EMPTY),
         ({"samples": np.full((1, TAPS - 1, 2), 5, np.int16), "start_index": np.array([729])}, Refusal.TRUNCATED),
         ({}, Refusal.NOT),

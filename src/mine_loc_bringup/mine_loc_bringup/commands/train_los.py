@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from mine_loc_bringup.los import train as runs  # noqa: PLC0415
     from mine_loc_bringup.los.recordings import read_recording  # noqa: PLC0415
-    from mine_loc_bringup.los.report import inner_figures  # noqa: PLC0415
+    from mine_loc_bringup.los.report import inner_figures, reliability_plot  # noqa: PLC0415
     from mine_loc_uwb.labelled_frames import training_set  # noqa: PLC0415
     from mine_loc_uwb.los_model_file import save_model  # noqa: PLC0415
     from mine_loc_uwb.los_training import TrainingOptions  # noqa: PLC0415
@@ -81,7 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
     }
     digest = save_model(out, network, card)
     runs.clear(folder)
-    print(f"{out}: {out.stat().st_size / 1e3:.0f} kB, sha256 {digest[:16]}")
+    reliability_plot(out.with_suffix(".png"), chosen.los_probability[0], chosen.los, "placements held out")
+    print(f"{out}: {out.stat().st_size / 1e3:.0f} kB, sha256 {digest[:16]}; reliability: {out.with_suffix('.png')}")
     for name, value in card["figures"].items():
         print(f"  {name:28} {value:.3f}")
     return 0

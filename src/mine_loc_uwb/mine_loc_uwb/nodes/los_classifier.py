@@ -1,7 +1,7 @@
 """LOS or NLOS of every reception whose accumulator came with it."""
 
 import sys
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
@@ -17,6 +17,9 @@ from mine_loc_uwb.cir_input import Refusal
 from mine_loc_uwb.link_judgement import Classifier, LinkJudge, load_classifier
 from mine_loc_uwb.nodes.cir_messages import tap_count, to_cir_frames, to_link_state
 from mine_loc_uwb.parameters import LosClassifierParameters
+
+_MOST_WAITING = 1024
+"""Frames that wait for judgement; the oldest are given up beyond."""
 
 
 class LosClassifier(NodeBase):
@@ -34,7 +37,7 @@ class LosClassifier(NodeBase):
         self._card: dict = {}
         self._problem = ""
         self._judge_of = LinkJudge(self._load())
-        self._waiting: list[CirFrame] = []
+        self._waiting: deque[CirFrame] = deque(maxlen=_MOST_WAITING)
         self._judged = 0
         self._refused: Counter[str] = Counter()
         self._states = self.publish_to(LinkState, "uwb/link_state", EVENTS)
@@ -76,11 +79,14 @@ class LosClassifier(NodeBase):
         return classifier
 
     def _on_frame(self, frame: CirFrame) -> None:
+        if len(self._waiting) == _MOST_WAITING:
+            self._refused["overflow"] += 1
         self._waiting.append(frame)
         self._arrived.trigger()
 
     def _judge(self) -> None:
-        waiting, self._waiting = self._waiting, []
+        waiting = list(self._waiting)
+        self._waiting.clear()
         for _, group in groupby(waiting, tap_count):
             frames = list(group)
             links = [(frame.tag_id, frame.anchor_id) for frame in frames]
