@@ -143,7 +143,7 @@ def test_without_a_model_the_power_rule_judges_and_says_so(domain, observer, tmp
         assert state.method == LinkState.METHOD_POWER_RULE
         assert state.los_probability == pytest.approx(0.5)
         assert state.most_likely_class == LinkState.CLASS_UNKNOWN
-        assert observer.level("los_classifier: model") == 1
+        observer.wait_for(lambda: observer.level("los_classifier: model") == 1)
         assert "no such file" in observer.status["los_classifier: model"].message
     finally:
         node.stop()

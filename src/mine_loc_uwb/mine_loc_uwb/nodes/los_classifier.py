@@ -1,14 +1,17 @@
 """LOS or NLOS of every reception whose accumulator came with it."""
 
+import os
 import sys
+import threading
 from collections import Counter, deque
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import NoReturn
 
 from mine_loc_interfaces.msg import CirFrame, LinkState, LosModelInfo
 
-from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.node_base import NodeBase, run
@@ -22,6 +25,15 @@ _MOST_WAITING = 1024
 """Frames that wait for judgement; the oldest are given up beyond."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Model:
+    """What loading gave: a classifier and its card, or None and why."""
+
+    classifier: Classifier | None
+    card: dict
+    problem: str = ""
+
+
 class LosClassifier(NodeBase):
     """Judges what has arrived, as one batch; by the power rule if no model can be had."""
 
@@ -33,10 +45,11 @@ class LosClassifier(NodeBase):
         self._arrived = self.create_guard_condition(self.guarded(self._judge, "judgement"))
 
     def configure(self) -> None:
-        """Load the model; without one the power rule serves and the diagnostics say why."""
-        self._card: dict = {}
-        self._problem = ""
-        self._judge_of = LinkJudge(self._load())
+        """Begin to load the model. Frames wait until it is there."""
+        self._model: _Model | None = None
+        self._loaded: deque[_Model] = deque()
+        # torch takes seconds to import, in which the node must answer and be able to stop
+        threading.Thread(target=self._load, args=(self._loaded,), daemon=True).start()
         self._waiting: deque[CirFrame] = deque(maxlen=_MOST_WAITING)
         self._judged = 0
         self._refused: Counter[str] = Counter()
@@ -45,38 +58,43 @@ class LosClassifier(NodeBase):
         self.subscribe(CirFrame, "uwb/cir", self._on_frame, EVENTS)
 
     def activate(self) -> None:
-        """Say which model is in use."""
-        figures = self._card.get("figures", {})
-        info = LosModelInfo(
-            model_version=str(self._card.get("version", "power rule")),
-            model_sha256=str(self._card.get("sha256", "")),
-            training_data=", ".join(map(str, self._card.get("data", []))),
-            balanced_accuracy=float(figures.get("balanced_accuracy", float("nan"))),
-        )
-        info.header.stamp = self.get_clock().now().to_msg()
-        self._info.publish(info)
+        """Take up what came while the node was inactive."""
+        if self._model is not None:
+            self._announce(self._model)
+        self._arrived.trigger()
 
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Histories before and after do not belong together."""
-        self._judge_of.forget()
+        if self._model is not None:
+            self._links.forget()
 
     def health(self) -> Iterable[Health]:
         """The model in use, frames judged, and refused by cause."""
         figures = {"judged": self._judged} | dict(self._refused)
-        if self._problem:
-            yield Health("model", Level.WARN, f"power rule: {self._problem}", figures)
+        if self._model is None:
+            yield Health("model", Level.OK, "loading", figures)
+        elif self._model.problem:
+            yield Health("model", Level.WARN, f"power rule: {self._model.problem}", figures)
         else:
-            yield Health("model", Level.OK, str(self._card.get("version", "")), figures)
+            yield Health("model", Level.OK, str(self._model.card.get("version", "")), figures)
 
-    def _load(self) -> Classifier | None:
+    def _load(self, loaded: deque[_Model]) -> None:
         path = Path(self.parameters.model) if self.parameters.model else _shipped_model()
         try:
-            classifier, self._card = load_classifier(path, self.parameters.device)
-        except (ConfigurationError, ImportError, OSError) as error:
-            self._problem = str(error)
-            self.get_logger().warning(f"no model, the power rule serves: {error}")
-            return None
-        return classifier
+            loaded.append(_Model(*load_classifier(path, self.parameters.device)))
+        except Exception as error:  # noqa: BLE001 whatever is wrong with it, the power rule serves
+            loaded.append(_Model(None, {}, str(error) or repr(error)))
+        self._arrived.trigger()
+
+    def _announce(self, model: _Model) -> None:
+        info = LosModelInfo(
+            model_version=str(model.card.get("version", "power rule")),
+            model_sha256=str(model.card.get("sha256", "")),
+            training_data=", ".join(map(str, model.card.get("data", []))),
+            balanced_accuracy=float(model.card.get("figures", {}).get("balanced_accuracy", float("nan"))),
+        )
+        info.header.stamp = self.get_clock().now().to_msg()
+        self._info.publish(info)
 
     def _on_frame(self, frame: CirFrame) -> None:
         if len(self._waiting) == _MOST_WAITING:
@@ -85,29 +103,42 @@ class LosClassifier(NodeBase):
         self._arrived.trigger()
 
     def _judge(self) -> None:
+        if self._model is None and self._loaded:
+            self._model = self._loaded.popleft()
+            self._links = LinkJudge(self._model.classifier)
+            if self._model.problem:
+                self.get_logger().warning(f"no model, the power rule serves: {self._model.problem}")
+            self._announce(self._model)
+        if self._model is None:
+            return
         waiting = list(self._waiting)
         self._waiting.clear()
         for _, group in groupby(waiting, tap_count):
-            frames = list(group)
-            links = [(frame.tag_id, frame.anchor_id) for frame in frames]
-            stamps_ns = [to_stamp_ns(frame.header.stamp) for frame in frames]
-            for frame, judged in zip(
-                frames, self._judge_of.judge(to_cir_frames(frames), links, stamps_ns), strict=True
-            ):
-                self._judged += judged.refusal is Refusal.NOT
-                if judged.refusal is not Refusal.NOT:
-                    self._refused[judged.refusal.name.lower()] += 1
-                self._states.publish(to_link_state(frame, judged))
+            self._judge_batch(list(group))
+
+    def _judge_batch(self, frames: list[CirFrame]) -> None:
+        links = [(frame.tag_id, frame.anchor_id) for frame in frames]
+        stamps_ns = [to_stamp_ns(frame.header.stamp) for frame in frames]
+        judgements = self._links.judge(to_cir_frames(frames), links, stamps_ns)
+        for frame, judged in zip(frames, judgements, strict=True):
+            if judged.refusal is Refusal.NOT:
+                self._judged += 1
+            else:
+                self._refused[judged.refusal.name.lower()] += 1
+            self._states.publish(to_link_state(frame, judged))
 
 
 def _shipped_model() -> Path:
     return Path(__file__).parents[1] / "models" / "los.safetensors"
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Entry point."""
-    return run(LosClassifier)
+    status = run(LosClassifier)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)  # unloading torch takes longer than a node has to end
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
