@@ -39,7 +39,15 @@ HERE = Path(__file__).parent
 SEEDS = (1, 2, 3)
 FOREST_EVERY = 4  # neighbouring frames of one placement are near copies
 SIMULATED = TrainingOptions(
-    steps=1600, batch=256, caution=0.0, augment=False, hide_range=0.0, hide_levels=0.0, check_every=1600
+    steps=3000,
+    check_every=3000,
+    batch=256,
+    learning_rate=2e-3,
+    averaging=0.995,
+    caution=0.0,
+    augment=False,
+    hide_range=0.0,
+    hide_levels=0.0,
 )
 Reals = NDArray[np.float64]
 Fold = tuple[int, int]

@@ -27,7 +27,7 @@ class Scene:
     seconds: float
 
 
-TRAINING_SCENES = (Scene("gallery_2km", 20, 30.0), Scene("vehicle", 6, 20.0))
+TRAINING_SCENES = (Scene("gallery_2km", 30, 30.0), Scene("vehicle", 6, 30.0))
 TEST_SCENES = (Scene("example_mine", 10, 20.0),)
 
 
