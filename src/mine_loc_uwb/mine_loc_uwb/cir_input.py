@@ -42,6 +42,7 @@ _LEAST_QUIET = 64
 _STD_NOISE_SHARE = 0.87  # STD_NOISE over the deviation of |z| (uwb_cirs_2018, as mine_loc_sim)
 _RMS_OF_DEVIATION = 1.0 / np.sqrt(1.0 - np.pi / 4.0)  # of a Rayleigh magnitude
 _RAIL = 32767
+_TURN_A_TAP = (2j * np.pi * scipy.fft.fftfreq(TAPS)).astype(np.complex64)
 
 
 class Refusal(IntEnum):
@@ -86,13 +87,15 @@ def refusals(frames: CirFrames) -> NDArray[np.int64]:
         return np.full(len(frames), int(Refusal.EMPTY))
     inside = (first >= 0) & (first + TAPS <= taps)
     found[~inside] = Refusal.TRUNCATED
-    silent = ~_window(frames.samples, np.where(inside, first, 0).astype(int) % max(taps - TAPS + 1, 1)).any(axis=(1, 2))
-    found[inside & silent] = Refusal.EMPTY
-    extremes = np.stack([frames.samples.min(axis=(1, 2)), frames.samples.max(axis=(1, 2))]).astype(int)
-    found[np.abs(extremes).max(axis=0) >= _RAIL] = Refusal.SATURATED
+    held = _window(frames.samples, np.where(inside, first, 0).astype(int)).reshape(len(frames), -1)
+    least, most = held.min(axis=1), held.max(axis=1)
+    found[inside & ((most == _RAIL) | (least <= -_RAIL))] = Refusal.SATURATED
+    found[inside & (most == 0) & (least == 0)] = Refusal.EMPTY
     position = frames.first_path_index - frames.start_index
     found[~((frames.first_path_index > 0) & (position >= 0) & (position < taps))] = Refusal.NO_FIRST_PATH
-    found[~extremes.any(axis=0)] = Refusal.EMPTY
+    silent = ~inside & (found == Refusal.TRUNCATED)
+    if silent.any():
+        found[silent] = np.where(frames.samples[silent].any(axis=(1, 2)), Refusal.TRUNCATED, Refusal.EMPTY)
     return found
 
 
@@ -103,8 +106,7 @@ def los_input(frames: CirFrames) -> LosInput:
     first = whole - BEFORE - frames.start_index
     raw = _window(frames.samples, first).astype(np.float32)
     spectrum = scipy.fft.fft(raw.view(np.complex64)[..., 0], axis=1)
-    turn = np.exp(2j * np.pi * scipy.fft.fftfreq(TAPS).astype(np.float32) * fraction[:, None]).astype(np.complex64)
-    spectrum *= turn
+    spectrum *= np.exp(_TURN_A_TAP * fraction[:, None])
     magnitude = np.abs(scipy.fft.ifft(spectrum, axis=1))
     noise = _noise_counts(frames, first, raw)
     peak = magnitude.max(axis=1, keepdims=True)

@@ -25,15 +25,16 @@ def delay_features(window: Floats, before: int, offset: Floats, noise: Floats) -
     mean = energy @ delay / total
     spread = np.sqrt(np.maximum(energy @ delay**2 / total - mean**2, 0.0))
     peak = window.max(axis=1)
-    centred = window - window.mean(axis=1, keepdims=True)
-    squared = centred * centred
+    squared = (window - window.sum(axis=1, keepdims=True) / window.shape[1]) ** 2
+    second = squared.sum(axis=1) / window.shape[1]
+    fourth = (squared * squared).sum(axis=1) / window.shape[1]
     early = energy[:, before - _AHEAD : before + _EARLY].sum(axis=1) / total
     return np.column_stack(
         [
             np.log(np.maximum(mean, 0.3)),
             np.log(np.maximum(spread, 0.3)),
             np.log1p(np.maximum(offset + window.argmax(axis=1), 0.0)),
-            np.log((squared * squared).mean(axis=1) / np.maximum(squared.mean(axis=1) ** 2, 1e-6) + 1e-6),
+            np.log(fourth / np.maximum(second**2, 1e-6) + 1e-6),
             np.log1p(np.maximum(offset + (window > 0.9 * peak[:, None]).argmax(axis=1), 0.0)),
             early,
             10.0 * np.log10(early + 1e-3),

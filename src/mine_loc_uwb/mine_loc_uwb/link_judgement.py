@@ -67,7 +67,7 @@ class LinkJudge:
         judged = [Judgement(Method.NETWORK, Refusal(int(reason))) for reason in refused]
         if not len(fit):
             return judged
-        seen = los_input(frames.take(fit))
+        seen = los_input(frames if len(fit) == len(frames) else frames.take(fit))
         rows = zip(fit.tolist(), seen.side, strict=True)
         side = np.stack([self._history.extend(links[number], stamps_ns[number], row) for number, row in rows])
         probability = self._classifier(LosInput(seen.profile, seen.edge, side))
