@@ -43,6 +43,9 @@ _STD_NOISE_SHARE = 0.87  # STD_NOISE over the deviation of |z| (uwb_cirs_2018, a
 _RMS_OF_DEVIATION = 1.0 / np.sqrt(1.0 - np.pi / 4.0)  # of a Rayleigh magnitude
 _RAIL = 32767
 _TURN_A_TAP = (2j * np.pi * scipy.fft.fftfreq(TAPS)).astype(np.complex64)
+_EDGE_AT = BEFORE - 2 + np.arange(EDGE_TAPS * EDGE_PER_TAP) / EDGE_PER_TAP
+_TO_EDGE = (np.exp(2j * np.pi * scipy.fft.fftfreq(TAPS)[:, None] * _EDGE_AT) / TAPS).astype(np.complex64)
+"""Band-limited interpolation of the leading edge from a window's spectrum."""
 
 
 class Refusal(IntEnum):
@@ -112,7 +115,7 @@ def los_input(frames: CirFrames) -> LosInput:
     peak = magnitude.max(axis=1, keepdims=True)
     above_noise = np.log10(np.maximum(magnitude / noise[:, None], 1.0))
     profile = np.stack([magnitude / peak, 0.5 * above_noise], axis=1).astype(np.float32)
-    edge = _edge(spectrum) / peak
+    edge = np.abs(spectrum @ _TO_EDGE) / peak
     side = _side(frames, np.hypot(raw[..., 0], raw[..., 1]), fraction, noise)
     return LosInput(profile, edge.astype(np.float32), side)
 
@@ -121,16 +124,6 @@ def _window(samples: NDArray[np.int16], first: NDArray[np.int64]) -> NDArray[np.
     """The taps from `first` (n,) on of samples (n, taps, 2): (n, TAPS, 2), or fewer if there are not so many."""
     taps = np.arange(min(TAPS, samples.shape[1]))
     return np.asarray(samples[np.arange(len(samples))[:, None], first[:, None] + taps])
-
-
-def _edge(spectrum: NDArray[np.complex64]) -> Floats:
-    """Interpolate the leading edge: zeros between the halves of the spectrum."""
-    half = TAPS // 2
-    longer = np.zeros((len(spectrum), TAPS * EDGE_PER_TAP), np.complex64)
-    longer[:, :half], longer[:, -half:] = spectrum[:, :half], spectrum[:, half:]
-    first = (BEFORE - 2) * EDGE_PER_TAP
-    fine = scipy.fft.ifft(longer, axis=1)[:, first : first + EDGE_TAPS * EDGE_PER_TAP]
-    return np.asarray(np.abs(fine) * np.float32(EDGE_PER_TAP))
 
 
 def _noise_counts(frames: CirFrames, first: NDArray[np.int64], raw: Floats) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from mine_loc_uwb import los_evidence as evidence
 from mine_loc_uwb.cir_input import CHANNELS, EDGE_PER_TAP, EDGE_TAPS, SIDE_NAMES
 from mine_loc_uwb.los_evidence import EvidenceWeights
 
-CLASSES = 4
+_POWERS = [evidence.POWER, evidence.FIRST_POWER]
 _FEATURES = len(SIDE_NAMES)
 _WIDTH, _HIDDEN, _EDGE, _SIDE = 24, 32, 24, 32
 _CLIP = 2.5
@@ -26,11 +26,17 @@ class Evidence(nn.Module):
 
     with_range: Tensor
     without_range: Tensor
+    middle_db: Tensor
+    scale_db: Tensor
 
     def __init__(self) -> None:
         super().__init__()
         self.register_buffer("with_range", torch.zeros(3))
         self.register_buffer("without_range", torch.zeros(2))
+        self.register_buffer("middle_db", torch.tensor([0.0, evidence.FIRST_MIDDLE_DB]), persistent=False)
+        self.register_buffer(
+            "scale_db", torch.tensor([evidence.POWER_SCALE_DB, evidence.FIRST_SCALE_DB]), persistent=False
+        )
 
     def set(self, weights: EvidenceWeights) -> None:
         """Take over fitted weights."""
@@ -39,13 +45,12 @@ class Evidence(nn.Module):
 
     def forward(self, side: Tensor) -> Tensor:
         """Logits (n,) of side features (n, 2 f); NaN where nothing is known."""
-        power = torch.tanh(side[:, evidence.POWER] / evidence.POWER_SCALE_DB)
-        first = torch.tanh((side[:, evidence.FIRST_POWER] - evidence.FIRST_MIDDLE_DB) / evidence.FIRST_SCALE_DB)
-        noise = (side[:, evidence.NOISE] - evidence.NOISE_MIDDLE) / evidence.NOISE_SCALE
-        a, b, c = self.with_range
-        d, e = self.without_range
-        ranged = a * power + b * first + c
-        return torch.where(ranged.isnan(), d * noise.clamp(-evidence.NOISE_MOST, evidence.NOISE_MOST) + e, ranged)
+        power_and_first = torch.tanh((side[:, _POWERS] - self.middle_db) / self.scale_db)
+        noise = ((side[:, evidence.NOISE] - evidence.NOISE_MIDDLE) / evidence.NOISE_SCALE).clamp(
+            -evidence.NOISE_MOST, evidence.NOISE_MOST
+        )
+        ranged = power_and_first @ self.with_range[:2] + self.with_range[2]
+        return torch.where(ranged.isnan(), noise * self.without_range[0] + self.without_range[1], ranged)
 
 
 class LosNetwork(nn.Module):
