@@ -4,7 +4,9 @@ import math
 
 import pytest
 
-msg = pytest.importorskip("mine_loc_interfaces.msg")
+pytest.importorskip("rclpy")
+
+from mine_loc_interfaces import msg
 
 from mine_loc_fusion.nodes.synchroniser import links_received
 
