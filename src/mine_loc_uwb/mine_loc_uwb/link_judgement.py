@@ -64,16 +64,19 @@ class LinkJudge:
             return [_by_powers(*row) for row in zip(frames.first_path_power_dbm, frames.receive_power_dbm, strict=True)]
         refused = refusals(frames)
         fit = np.flatnonzero(refused == Refusal.NOT)
-        judged = [Judgement(Method.NETWORK, Refusal(int(reason))) for reason in refused]
+        judged = {
+            number: Judgement(Method.NETWORK, Refusal(int(refused[number])))
+            for number in np.flatnonzero(refused != Refusal.NOT).tolist()
+        }
         if not len(fit):
-            return judged
+            return [judged[number] for number in range(len(frames))]
         seen = los_input(frames if len(fit) == len(frames) else frames.take(fit))
         rows = zip(fit.tolist(), seen.side, strict=True)
         side = np.stack([self._history.extend(links[number], stamps_ns[number], row) for number, row in rows])
         probability = self._classifier(LosInput(seen.profile, seen.edge, side))
         for number, row in zip(fit.tolist(), probability.tolist(), strict=True):
             judged[number] = Judgement(Method.NETWORK, Refusal.NOT, row[2] + row[3], tuple(row))
-        return judged
+        return [judged[number] for number in range(len(frames))]
 
 
 def _by_powers(first_path_dbm: float, receive_dbm: float) -> Judgement:

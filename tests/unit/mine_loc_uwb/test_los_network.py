@@ -207,6 +207,14 @@ def test_the_judge_refuses_with_the_reason_and_judges_the_rest_alone():
     assert alone[0].class_probability == pytest.approx(judged[2].class_probability, abs=1e-5)
 
 
+@pytest.mark.parametrize("count", [1, 7, 96])
+def test_live_use_gives_what_the_network_gives_for_batches_of_any_size(data, count):
+    network, _ = load_model(shipped_model())
+    some = data.input.take(slice(0, count)).without_range() if count == 7 else data.input.take(slice(0, count))
+    wanted = np.exp(log_probabilities(network, some))
+    assert load_classifier(shipped_model(), "cpu")[0](some) == pytest.approx(wanted, abs=1e-5)
+
+
 def test_without_a_model_the_power_rule_judges_and_says_so():
     frames = pulses([745.0, 745.0, 745.0], first_path_power_dbm=np.array([-83.0, -88.0, -95.0]))
     judged = LinkJudge(None).judge(frames, ["a"] * 3, [0, 1, 2])
