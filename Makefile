@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb lock clean
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -33,6 +33,9 @@ bench-sim: setup ## the simulator against its models and real data (bench/result
 
 bench-uwb: setup ## the UWB solvers against papers, recordings and libraries (bench/results/uwb.json)
 	@$(run) python bench/uwb.py
+
+bench-los: setup ## the LOS/NLOS classifier on placements and scenes it never saw (bench/results/los.json)
+	@$(run) python bench/los.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from mine_loc_uwb.delay_features import delay_features
+
 _BEFORE, _AFTER = 16, 112
 _EVERY = 8  # neighbouring frames of one placement are near copies
 
@@ -34,31 +36,8 @@ def features(
     columns = np.clip(floor[:, None] + np.arange(-_BEFORE, _AFTER), 0, magnitude.shape[1] - 1)
     window = np.take_along_axis(magnitude, columns, axis=1).astype(float)
     noise = np.sqrt((magnitude[:, 64:700].astype(float) ** 2).mean(axis=1))
-    energy = np.where(window > 3.0 * noise[:, None], window**2 - noise[:, None] ** 2, 0.0)
-    energy[:, : _BEFORE - 2] = 0.0
-    total = np.maximum(energy.sum(axis=1), 1.0)
-    delay = np.arange(-_BEFORE, _AFTER)
-    mean = energy @ delay / total
-    spread = np.sqrt(np.maximum(energy @ delay**2 / total - mean**2, 0.0))
-    peak = window.max(axis=1)
-    offset = floor - _BEFORE - first_path_index
-    centred = window - window.mean(axis=1, keepdims=True)
-    early = energy[:, _BEFORE - 2 : _BEFORE + 4].sum(axis=1) / total
-    return np.column_stack(
-        [
-            receive_power_dbm - first_path_power_dbm,
-            np.log(np.maximum(mean, 0.3)),
-            np.log(np.maximum(spread, 0.3)),
-            np.log1p(np.maximum(offset + window.argmax(axis=1), 0.0)),
-            np.log((centred**4).mean(axis=1) / window.var(axis=1) ** 2),
-            np.log1p(np.maximum(offset + (window > 0.9 * peak[:, None]).argmax(axis=1), 0.0)),
-            early,
-            10.0 * np.log10(early + 1e-3),
-            20.0 * np.log10(peak / noise),
-            np.log(symbols),
-            receive_power_dbm,
-        ]
-    )
+    delays = delay_features(window, _BEFORE, floor - _BEFORE - first_path_index, noise)
+    return np.column_stack([receive_power_dbm - first_path_power_dbm, delays, np.log(symbols), receive_power_dbm])
 
 
 def read_real(folder: Path) -> Receptions:

@@ -4,7 +4,7 @@ setup(
     name="mine_loc_uwb",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"mine_loc_uwb": ["py.typed"]},
+    package_data={"mine_loc_uwb": ["py.typed", "models/*.safetensors"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/mine_loc_uwb"]),
         ("share/mine_loc_uwb", ["package.xml"]),

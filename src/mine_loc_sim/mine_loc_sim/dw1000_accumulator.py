@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mine_loc_sim import radio_constants as constants
 from mine_loc_sim.channel_15_4a import FINE_PER_TAP, TAP_NS, Taps
+from mine_loc_uwb.received_power import reported_level_dbm
 
 _GUARD_TAPS = 8
 
@@ -27,13 +28,6 @@ class Reception:
     saturated: NDArray[np.bool_]
     direct_index: NDArray[np.float64]  # where delay 0 of the response lies, taps: truth
     full_count: int
-
-
-def reported_level_dbm(level_dbm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the chip's power registers make of a true received level."""
-    excess = np.maximum(level_dbm - constants.COMPRESSION_KNEE_DBM, 0.0)
-    compressed = np.minimum(level_dbm, constants.COMPRESSION_KNEE_DBM) + constants.COMPRESSION_SLOPE * excess
-    return np.minimum(compressed, constants.REPORTED_LEVEL_CEILING_DBM)
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,11 +69,6 @@ PULSE_PERIOD_TAPS = 2.2
 height; medians over the LOS placements of cirs: 0.05, 0.18, 0.49, 0.82 and 0.98, and nothing above 0.03 before."""
 POWER_CONSTANT_DB = 121.74
 """A in the power formulas at PRF 64 MHz (UM 4.7)."""
-COMPRESSION_KNEE_DBM = -88.0
-COMPRESSION_SLOPE = 1.0 / (1.0 + 1.1667)
-"""Above the knee the reported level rises by this share of the true one (arduino-dw1000's fit to UM figure 22)."""
-REPORTED_LEVEL_CEILING_DBM = -78.3
-"""Strongest level ever reported: median of the three strongest placements is -78.5, best frame -78.2 (cirs)."""
 ACCUMULATOR_LIMIT = 16384.0
 """Accumulation stops as soon as a component reaches it: peaks pile up there, RXPACC falls with level (cirs)."""
 PREAMBLE_COUNT_1024 = 998

@@ -18,7 +18,6 @@ from mine_loc_sim.dw1000_accumulator import (
     accumulate,
     band_limit,
     pulse_peak,
-    reported_level_dbm,
     taps_to_m,
 )
 from mine_loc_sim.gauss_markov import GaussMarkov
@@ -28,6 +27,7 @@ from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.radio_constants import Environment
 from mine_loc_sim.range_bias import edge_lead_m, level_bias_m
 from mine_loc_sim.wearer import Wearer, body_process
+from mine_loc_uwb.received_power import reported_level_dbm
 
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]

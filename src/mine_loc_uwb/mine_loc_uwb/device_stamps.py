@@ -19,6 +19,7 @@ class DeviceStamps:
         self._trust = trust_device_clock
         self._clocks: OrderedDict[tuple[int, ...], DeviceClock] = OrderedDict()
         self._sequences: OrderedDict[tuple[int, ...], int] = OrderedDict()
+        self._rounds: OrderedDict[int, tuple[int, DeviceStamp]] = OrderedDict()
         self.lost_rounds = 0
         self.clock_resets = 0
 
@@ -39,6 +40,18 @@ class DeviceStamps:
             self.clock_resets += 1
         return stamp
 
+    def remember_round(self, tag_id: int, seq: int, stamp: DeviceStamp) -> None:
+        """Keep number and stamp of a tag's latest round for the accumulators of its receptions."""
+        self._rounds[tag_id] = (seq, stamp)
+        self._rounds.move_to_end(tag_id)
+        if len(self._rounds) > _MAX_DEVICES:
+            self._rounds.popitem(last=False)
+
+    def stamp_of_round(self, tag_id: int, seq: int) -> DeviceStamp | None:
+        """The stamp that a tag's latest round was given; None if that round has another number."""
+        known = self._rounds.get(tag_id)
+        return known[1] if known is not None and known[0] == seq else None
+
     def number(self, key: tuple[int, ...], decoder: Decoder, seq: int | None) -> int:
         """The round's number, counted here where the device has no counter; gaps count as lost rounds."""
         last = self._sequences.get(key)
@@ -58,3 +71,4 @@ class DeviceStamps:
         """Start anew: time jumped, or another device may be on the line."""
         self._clocks.clear()
         self._sequences.clear()
+        self._rounds.clear()

@@ -25,6 +25,14 @@ class Dwm1000DriverParameters(NodeParameters):
 
 
 @dataclass(frozen=True)
+class LosClassifierParameters(NodeParameters):
+    """LOS or NLOS from CIR frames."""
+
+    model: str = parameter("", "file written by mine-loc train-los; empty = the one that is shipped", read_only=True)
+    device: str = parameter("cpu", "where the network runs", choices=("cpu", "cuda"), read_only=True)
+
+
+@dataclass(frozen=True)
 class UwbSolverParameters(NodeParameters):
     """Positions from ranging rounds."""
 

@@ -7,11 +7,21 @@ from math import isnan, log10, nan, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from mine_loc_uwb.ranging import LIGHT_IN_AIR_M_PER_S
+
 _A_DB = {16: 113.77, 64: 121.74}
 """The constant A of section 4.7.1 by PRF. Version 2.05 prints 115.72 for PRF 16 in 4.7.2; later versions correct it."""
 
 _COMPRESSION_START_DBM = -88.0
 _COMPRESSION_SLOPE = {16: 2.3334, 64: 1.1667}
+_REPORTED_CEILING_DBM = -78.3
+"""Strongest level ever reported: median of the strongest placements of uwb_cirs_2018 is -78.5, best frame -78.2."""
+
+_TRANSMIT_POWER_DBM = -14.3
+"""-41.3 dBm/MHz over 499.2 MHz: the legal limit, which DW1000 boards are set to; no antenna gain."""
+_CARRIER_MHZ = {1: 3494.4, 2: 3993.6, 3: 4492.8, 4: 3993.6, 5: 6489.6, 7: 6489.6}
+"""Centre frequencies of the DW1000's channels (User Manual, section 10.5)."""
+_USUAL_CHANNEL = 2
 
 
 class Sfd(IntEnum):
@@ -103,6 +113,24 @@ def uncompress_dbm(power_dbm: npt.NDArray[np.float64], prf_mhz: int) -> npt.NDAr
     """Undo the saturation of the power estimate above -88 dBm, as thotro/arduino-dw1000 does; any shape, NaN stays."""
     excess_db = np.maximum(power_dbm - _COMPRESSION_START_DBM, 0.0)
     return power_dbm + excess_db * _COMPRESSION_SLOPE[prf_mhz]
+
+
+def reported_level_dbm(level_dbm: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """What the power registers make of true received levels at PRF 64 MHz; the inverse of `uncompress_dbm`, capped."""
+    excess_db = np.maximum(level_dbm - _COMPRESSION_START_DBM, 0.0)
+    compressed = np.minimum(level_dbm, _COMPRESSION_START_DBM) + excess_db / (1.0 + _COMPRESSION_SLOPE[64])
+    return np.asarray(np.minimum(compressed, _REPORTED_CEILING_DBM))
+
+
+def free_space_level_dbm(range_m: npt.NDArray[np.float64], channel: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """True level [dBm] at ranges (n,) in free space (Friis), isotropic antennas; NaN ranges give NaN.
+
+    channel: (n,) UWB channels; one that is not known is taken for 2. Ranges below 0.1 m count as 0.1 m.
+    """
+    mhz = np.array([_CARRIER_MHZ.get(number, _CARRIER_MHZ[_USUAL_CHANNEL]) for number in channel.tolist()])
+    wavelength_m = LIGHT_IN_AIR_M_PER_S / (mhz * 1e6)
+    turns = 4.0 * np.pi * np.maximum(range_m, 0.1) / wavelength_m
+    return np.asarray(_TRANSMIT_POWER_DBM - 20.0 * np.log10(turns))
 
 
 def los_probability_from_powers(first_path_dbm: float, receive_dbm: float) -> float:

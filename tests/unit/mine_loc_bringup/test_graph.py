@@ -27,6 +27,7 @@ def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_and_one_of_e
     assert [process.name for process in expand(SITE, PEOPLE, FOLDER)] == [
         "dwm1000_driver_portal",
         "dwm1000_driver_junction",
+        "los_classifier",
         "uwb_solver",
         "fitter/n100_driver",
         "driver/n100_driver",

@@ -1,5 +1,6 @@
 """Time alignment: everything measured, as epochs of one person each, in order."""
 
+import math
 import sys
 from collections.abc import Hashable, Iterable
 from pathlib import Path
@@ -90,7 +91,7 @@ class SynchroniserNode(NodeBase):
             self._unknown_tags.clear()
 
     def _on_ranges(self, message: msg.UwbRangeArray) -> None:
-        self._on_tag(Kind.RANGES, message, message.seq, message.reporter_id, links=len(message.ranges))
+        self._on_tag(Kind.RANGES, message, message.seq, message.reporter_id, links=links_received(message))
 
     def _on_tag(self, kind: Kind, message: Any, seq: int, source: Hashable = 0, links: int = 0) -> None:
         person = self._people.people.by_tag(message.tag_id)
@@ -121,6 +122,11 @@ class SynchroniserNode(NodeBase):
             for kind, payloads in epoch.inputs.items():
                 setattr(message, kind.value, payloads)
             self._epochs.publish(message)
+
+
+def links_received(message: msg.UwbRangeArray) -> int:
+    """How many link states a round can get: none of an exchange that failed."""
+    return sum(math.isfinite(each.range_raw) for each in message.ranges)
 
 
 def main() -> int:

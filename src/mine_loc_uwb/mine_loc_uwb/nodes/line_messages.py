@@ -30,6 +30,7 @@ def stamped_message(
         key = (message.reporter_id, message.tag_id)
         stamp = stamps.stamp(key, decoder, message.device_ticks, arrival_ns)
         seq = stamps.number(key, decoder, message.seq)
+        stamps.remember_round(message.tag_id, seq, stamp)
         return to_range_array(message, seq, stamp, _FRAME, decoder.tick_period_s * NS_PER_S, range_sd_m)
     if isinstance(message, TdoaBlink):
         key = (message.reference_anchor_id,)
@@ -37,8 +38,11 @@ def stamped_message(
         seq = stamps.number((*key, message.tag_id), decoder, message.seq)
         return to_tdoa_array(message, seq, stamp, _FRAME)
     if isinstance(message, CirWindow):
-        key = (message.anchor_id, message.tag_id)
-        return to_cir_frame(message, stamps.stamp(key, decoder, message.device_ticks, arrival_ns), _FRAME)
+        # The stamp of its round: by it, what is judged of an accumulator joins the epoch of that round.
+        stamp = stamps.stamp_of_round(message.tag_id, message.seq)
+        if stamp is None:
+            stamp = stamps.stamp((message.anchor_id, message.tag_id), decoder, message.device_ticks, arrival_ns)
+        return to_cir_frame(message, stamp, _FRAME)
     return None
 
 

@@ -1,0 +1,1 @@
+"""Labelled recordings, training runs and reports of the LOS classifier."""

@@ -1,0 +1,144 @@
+"""LOS or NLOS of every reception whose accumulator came with it."""
+
+import os
+import sys
+import threading
+from collections import Counter, deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import NoReturn
+
+from mine_loc_interfaces.msg import CirFrame, LinkState, LosModelInfo
+
+from mine_loc_core.health import Health, Level
+from mine_loc_core.nodes.conversions import to_stamp_ns
+from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_uwb.cir_input import Refusal
+from mine_loc_uwb.link_judgement import Classifier, LinkJudge, load_classifier
+from mine_loc_uwb.nodes.cir_messages import tap_count, to_cir_frames, to_link_state
+from mine_loc_uwb.parameters import LosClassifierParameters
+
+_MOST_WAITING = 1024
+"""Frames that wait for judgement; the oldest are given up beyond."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Model:
+    """What loading gave: a classifier and its card, or None and why."""
+
+    classifier: Classifier | None
+    card: dict
+    problem: str = ""
+
+
+class LosClassifier(NodeBase):
+    """Judges what has arrived, as one batch; by the power rule if no model can be had."""
+
+    parameter_class = LosClassifierParameters
+    needs_guard_condition = True
+
+    def __init__(self) -> None:
+        super().__init__("los_classifier")
+        self._arrived = self.create_guard_condition(self.guarded(self._judge, "judgement"))
+
+    def configure(self) -> None:
+        """Begin to load the model. Frames wait until it is there."""
+        self._model: _Model | None = None
+        self._loaded: deque[_Model] = deque()
+        # torch takes seconds to import, in which the node must answer and be able to stop
+        threading.Thread(target=self._load, args=(self._loaded,), daemon=True).start()
+        self._waiting: deque[CirFrame] = deque(maxlen=_MOST_WAITING)
+        self._judged = 0
+        self._refused: Counter[str] = Counter()
+        self._states = self.publish_to(LinkState, "uwb/link_state", EVENTS)
+        self._info = self.publish_to(LosModelInfo, "~/model_info", LATCHED)
+        self.subscribe(CirFrame, "uwb/cir", self._on_frame, EVENTS)
+
+    def activate(self) -> None:
+        """Take up what came while the node was inactive."""
+        if self._model is not None:
+            self._announce(self._model)
+        self._arrived.trigger()
+
+    def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
+        """Histories before and after do not belong together."""
+        if self._model is not None:
+            self._links.forget()
+
+    def health(self) -> Iterable[Health]:
+        """The model in use, frames judged, and refused by cause."""
+        figures = {"judged": self._judged} | dict(self._refused)
+        if self._model is None:
+            yield Health("model", Level.OK, "loading", figures)
+        elif self._model.problem:
+            yield Health("model", Level.WARN, f"power rule: {self._model.problem}", figures)
+        else:
+            yield Health("model", Level.OK, str(self._model.card.get("version", "")), figures)
+
+    def _load(self, loaded: deque[_Model]) -> None:
+        path = Path(self.parameters.model) if self.parameters.model else _shipped_model()
+        try:
+            loaded.append(_Model(*load_classifier(path, self.parameters.device)))
+        except Exception as error:  # noqa: BLE001 whatever is wrong with it, the power rule serves
+            loaded.append(_Model(None, {}, str(error) or repr(error)))
+        self._arrived.trigger()
+
+    def _announce(self, model: _Model) -> None:
+        info = LosModelInfo(
+            model_version=str(model.card.get("version", "power rule")),
+            model_sha256=str(model.card.get("sha256", "")),
+            training_data=", ".join(map(str, model.card.get("data", []))),
+            balanced_accuracy=float(model.card.get("figures", {}).get("balanced_accuracy", float("nan"))),
+        )
+        info.header.stamp = self.get_clock().now().to_msg()
+        self._info.publish(info)
+
+    def _on_frame(self, frame: CirFrame) -> None:
+        if len(self._waiting) == _MOST_WAITING:
+            self._refused["overflow"] += 1
+        self._waiting.append(frame)
+        self._arrived.trigger()
+
+    def _judge(self) -> None:
+        if self._model is None and self._loaded:
+            self._model = self._loaded.popleft()
+            self._links = LinkJudge(self._model.classifier)
+            if self._model.problem:
+                self.get_logger().warning(f"no model, the power rule serves: {self._model.problem}")
+            self._announce(self._model)
+        if self._model is None:
+            return
+        waiting = list(self._waiting)
+        self._waiting.clear()
+        for _, group in groupby(waiting, tap_count):
+            self._judge_batch(list(group))
+
+    def _judge_batch(self, frames: list[CirFrame]) -> None:
+        links = [(frame.tag_id, frame.anchor_id) for frame in frames]
+        stamps_ns = [to_stamp_ns(frame.header.stamp) for frame in frames]
+        judgements = self._links.judge(to_cir_frames(frames), links, stamps_ns)
+        for frame, judged in zip(frames, judgements, strict=True):
+            if judged.refusal is Refusal.NOT:
+                self._judged += 1
+            else:
+                self._refused[judged.refusal.name.lower()] += 1
+            self._states.publish(to_link_state(frame, judged))
+
+
+def _shipped_model() -> Path:
+    return Path(__file__).parents[1] / "models" / "los.safetensors"
+
+
+def main() -> NoReturn:
+    """Entry point."""
+    status = run(LosClassifier)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)  # unloading torch takes longer than a node has to end
+
+
+if __name__ == "__main__":
+    main()
