@@ -184,14 +184,14 @@ class RoundSolver:
         self, tag_id: int, stamp_ns: int, items: Sequence[MeasuredRange], height_m: float | None, source: Source
     ) -> Measurements:
         anchors = [self.anchors[item.anchor_id] for item in items]
-        los_probability = np.array([self._los_probability(tag_id, stamp_ns, item) for item in items], float)
+        judged = np.array([self._judgement(tag_id, stamp_ns, item) for item in items], float).reshape(-1, 2)
         power_dbm = np.array([item.receive_power_dbm for item in items], float)
         power_dbm[~(np.abs(power_dbm) < _NO_LEVEL_DBM)] = math.nan
         range_m = np.array([item.range_m for item in items], float)
         variance_m2 = np.array([_variance(item, anchor) for item, anchor in zip(items, anchors, strict=True)], float)
         if source is Source.RANGE:
             offset_m = np.array([anchor.range_offset_m for anchor in anchors], float)
-            found = self._correction.correct(range_m, power_dbm, 1.0 - los_probability, offset_m)
+            found = self._correction.correct(range_m, power_dbm, 1.0 - judged[:, 0], offset_m)
             range_m, variance_m2 = np.maximum(found.range_m, _LEAST_RANGE_M), variance_m2 + found.added_variance_m2
         return Measurements(
             stamp_ns=stamp_ns,
@@ -200,17 +200,19 @@ class RoundSolver:
             range_m=range_m,
             variance_m2=variance_m2,
             since_s=np.array([item.since_ns / NS_PER_S for item in items], float) - self._correction.stamp_latency_s,
-            los_probability=los_probability,
+            los_probability=judged[:, 1].copy(),
             receive_power_dbm=uncompress_dbm(power_dbm, _PRF_MHZ),
             height_m=height_m,
             shared_offset=source is Source.TDOA,
         )
 
-    def _los_probability(self, tag_id: int, stamp_ns: int, item: MeasuredRange) -> float:
+    def _judgement(self, tag_id: int, stamp_ns: int, item: MeasuredRange) -> tuple[float, float]:
+        """LOS probability as it was told, and what that is worth at even odds: the classifier's, else the powers'."""
         told, told_ns = self._link_states.get(tag_id, {}).get(item.anchor_id, (math.nan, 0))
         if 0.0 <= told <= 1.0 and abs(stamp_ns - told_ns) <= _LINK_STATE_HOLDS_NS:
-            return told
-        return odds_of_power_rule(item.los_probability) if 0.0 <= item.los_probability <= 1.0 else math.nan
+            return told, told
+        rule = item.los_probability if 0.0 <= item.los_probability <= 1.0 else math.nan
+        return rule, odds_of_power_rule(rule)
 
 
 def rehearse(parameters: UwbSolverParameters, dimensions: int) -> None:

@@ -108,8 +108,9 @@ class UwbSolver(NodeBase):
         self._publish(*found, array, self.parameters.tdoa_method)
 
     def _on_link_state(self, state: LinkState) -> None:
-        stamp_ns = to_stamp_ns(state.header.stamp)
-        self._solver.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
+        if state.method != LinkState.METHOD_POWER_RULE:  # the range brings what its powers say
+            stamp_ns = to_stamp_ns(state.header.stamp)
+            self._solver.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
 
     def _publish(
         self, fix: Fix | None, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str
