@@ -52,6 +52,9 @@ class UwbSolverParameters(NodeParameters):
     acceleration_density: float = parameter(
         0.1, "spectral density of a person's acceleration", unit="m^2/s^3", low=1e-4, high=100.0
     )
+    systematic_sd: float = parameter(
+        0.2, "error of a link's ranges that stays; less where radios are calibrated", unit="m", low=0.0, high=5.0
+    )
     top_speed: float = parameter(3.0, "nobody moves faster against the anchors", unit="m/s", low=0.5, high=50.0)
     nlos_share: float = parameter(0.5, "share of links that are obstructed here", unit="1", low=0.01, high=0.95)
     nlos_excess: float = parameter(0.6, "mean excess way of an obstructed link", unit="m", low=0.01, high=20.0)

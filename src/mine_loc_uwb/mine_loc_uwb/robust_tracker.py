@@ -28,8 +28,16 @@ from mine_loc_uwb.tdoa_rss import solve_blink
 
 Ids = npt.NDArray[np.uint64]
 Slots = npt.NDArray[np.int64]
-_REASON = {kernel.ACCEPTED: Reason.ACCEPTED, kernel.GATE: Reason.GATE, kernel.KINEMATIC: Reason.KINEMATIC}
+_REASON = {
+    kernel.ACCEPTED: Reason.ACCEPTED,
+    kernel.TOO_LONG: Reason.GATE,
+    kernel.TOO_SHORT: Reason.GATE,
+    kernel.IMPOSSIBLE: Reason.KINEMATIC,
+}
 _MOST_LINKS = 16
+_MOST_COMMON_M2 = 5.0**2
+_HELD = 9.0
+"""A range within three deviations holds the place."""
 _CONTEST = 3
 """Of so many ranges half must be believed, or none is: a few that are wrong alike would drag the track."""
 _LONGEST_DOUBT_STEP_S = 0.5
@@ -47,6 +55,9 @@ class RobustTrackerSettings:
     bias_sd_m: float = 0.03
     bias_time_s: float = 100.0
     """Of a link, beyond what is calibrated."""
+    systematic_sd_m: float = 0.2
+    """What is common to all ranges of a link and no averaging takes away, 0.10 to 0.17 m in sight in four buildings and
+    more behind a body (hardware notes D.1, D.4): it goes into what is claimed, through the geometry."""
     common_bias_sd_m: float = 0.05
     common_bias_time_s: float = 100.0
     """Of all links of a tag: its own antenna delay."""
@@ -102,6 +113,7 @@ class RobustTracker:
         self._started = False
         self._stamp_ns = self._trusted_ns = 0
         self._doubt_s = 0.0
+        self._dilution = np.zeros((0, 0))
         self._slot: dict[int, int] = {}
         self._known = b"", np.empty(0, np.int64)
         self._link_nlos = np.empty(0)
@@ -116,13 +128,14 @@ class RobustTracker:
             return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
         codes, deviances, quality = np.empty(len(slots), np.int64), np.empty(len(slots)), np.empty(3)
+        self._dilution = np.zeros((measurements.dimensions, measurements.dimensions))
         offset_unknown = int(measurements.shared_offset and len(slots) > 0)
         before = self._x.copy(), self._P.copy(), self._link_nlos.copy()
         kernel.take_round(
             self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
             measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
             measurements.receive_power_dbm, self._link_nlos, gone_s, offset_unknown, self._gate, self._noise,
-            codes, deviances, quality,
+            codes, deviances, quality, self._dilution,
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
         reasons = tuple([_REASON[code] for code in codes.tolist()])
@@ -132,32 +145,47 @@ class RobustTracker:
             quality[:] = 0.0, math.nan, math.inf
             reasons = tuple([Reason.AMBIGUOUS if reason is Reason.ACCEPTED else reason for reason in reasons])
         solution = Solution(self._fix(measurements, quality), reasons, deviances, self._gate)
-        return self._settle_doubt(measurements, solution, gone_s)
+        if not len(codes):
+            return solution
+        short = bool(np.any((codes == kernel.TOO_SHORT) | (codes == kernel.IMPOSSIBLE)))
+        held = np.count_nonzero((codes == kernel.ACCEPTED) & (deviances < _HELD)) > measurements.dimensions
+        refused = len(codes) - quality[0]
+        if refused > quality[0] or (not held and (short or refused == quality[0])):
+            return self._doubt(measurements, solution, gone_s)
+        self._doubt_s = 0.0
+        if quality[0] >= measurements.dimensions:
+            self._trusted_ns = measurements.stamp_ns
+        return solution
 
-    def _settle_doubt(self, measurements: Measurements, solution: Solution, gone_s: float) -> Solution:
-        """Doubt grows while most ranges are refused; in the end the tracker begins anew where they agree."""
-        accepted, count = solution.fix.ranges_used, len(measurements)
-        if count == 0:
-            return solution
-        if 2 * accepted > count:
-            self._doubt_s = 0.0
-            if accepted >= measurements.dimensions:
-                self._trusted_ns = measurements.stamp_ns
-            return solution
+    def _doubt(self, measurements: Measurements, solution: Solution, gone_s: float) -> Solution:
+        """Doubt grows while most ranges are refused, or those that are too short and no more than hold the place.
+
+        Hardly anything makes a range too short: it is the place that is wrong. In the end the tracker begins anew where
+        ranges agree; where they do not, all that it claims is how far a person can have walked.
+        """
         self._doubt_s += min(gone_s, _LONGEST_DOUBT_STEP_S)
         if self._doubt_s < self._settings.reopen_after_s:
             return solution
         found = self._agreed_place(measurements)
+        if found is not None and self._can_be_at(found, measurements.stamp_ns):
+            return self._begin_at(found, measurements)
+        self._widen(measurements.dimensions)
+        solution = replace(solution, fix=replace(solution.fix, covariance_m2=self._covariance(measurements.dimensions)))
         if found is None:
             return solution
-        if self._can_be_at(found, measurements.stamp_ns):
-            return self._begin_at(found, measurements)
         refused = Reason.CAPTURE_GUARD
         reasons = tuple(
             refused if agrees and reason is not Reason.ACCEPTED else reason
             for agrees, reason in zip(found.agreeing, solution.reasons, strict=True)
         )
         return replace(solution, reasons=reasons)
+
+    def _widen(self, d: int) -> None:
+        """Let the spread be no less than a third of the way that can have been walked since the place was trusted."""
+        way_m = self._settings.top_speed_m_s * (self._stamp_ns - self._trusted_ns) / NS_PER_S
+        for axis in range(d):
+            self._P[axis, axis] = max(self._P[axis, axis], (way_m / 3.0) ** 2)
+            self._P[d + axis, d + axis] = max(self._P[d + axis, d + axis], self._settings.first_speed_sd_m_s**2)
 
     def _place_within_wide_spread(self, measurements: Measurements, gone_s: float) -> Consensus | None:
         """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
@@ -172,7 +200,8 @@ class RobustTracker:
         if found is None:
             return None
         way_m = float(np.linalg.norm(found.position_m - self._x[:d] - gone_s * self._x[d : 2 * d]))
-        return found if way_m < 3.0 * math.sqrt(variance) else None
+        reachable = self._can_be_at(found, measurements.stamp_ns)
+        return found if reachable and way_m < 3.0 * math.sqrt(variance) else None
 
     def _agreed_place(self, measurements: Measurements) -> Consensus | None:
         """The one place where more ranges agree than its coordinates need: as many as those always agree somewhere."""
@@ -207,11 +236,12 @@ class RobustTracker:
     def _begin_at(self, found: Consensus, measurements: Measurements) -> Solution:
         """Start where ranges agree; of two places that are as good all are believed."""
         self._place(measurements, found.position_m, found.covariance_m2)
-        codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.GATE)
+        codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.TOO_LONG)
         slots, quality = self._slots_of(measurements.anchor_ids), np.empty(3)
+        self._dilution = np.zeros((measurements.dimensions, measurements.dimensions))
         kernel.judge_round(
             self._x, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
-            measurements.since_s, measurements.plane_m, codes, quality,
+            measurements.since_s, measurements.plane_m, codes, quality, self._dilution,
         )  # fmt: skip
         reasons = tuple([_REASON[code] for code in codes.tolist()])
         return Solution(self._fix(measurements, quality), reasons, np.full(len(codes), math.nan), self._gate)
@@ -274,11 +304,19 @@ class RobustTracker:
         self._slot[anchor_id] = slot
         return slot
 
+    def _covariance(self, d: int) -> Array:
+        """Of the state, and what is common to each link through the geometry of the last round, up to some metres."""
+        covariance = np.zeros((3, 3))
+        covariance[:d, :d] = self._P[:d, :d]
+        common = self._settings.systematic_sd_m**2 * self._dilution
+        total = common.trace()
+        covariance[:d, :d] += common if total <= _MOST_COMMON_M2 else common * (_MOST_COMMON_M2 / total)
+        return covariance
+
     def _fix(self, measurements: Measurements, quality: Array) -> Fix:
         d = measurements.dimensions
-        position, covariance = self._x[:3].copy(), np.zeros((3, 3))
+        position, covariance = self._x[:3].copy(), self._covariance(d)
         if measurements.height_m is not None:
             position[2] = measurements.height_m
-        covariance[:d, :d] = self._P[:d, :d]
         used, rms, dilution = quality.tolist()
         return Fix(FixStatus.OK, position, covariance, d, int(used), rms, dilution)

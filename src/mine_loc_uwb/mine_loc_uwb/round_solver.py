@@ -20,7 +20,7 @@ from mine_loc_uwb.solver import Solution, Solver
 from mine_loc_uwb.solvers import RANGE_SOLVERS, TDOA_SOLVERS
 
 _MOST_TAGS = 4096
-_DEFAULT_VARIANCE_M2 = 0.1**2
+_DEFAULT_VARIANCE_M2, _LEAST_VARIANCE_M2, _MOST_VARIANCE_M2 = 0.1**2, 0.001**2, 1000.0**2
 _LEAST_RANGE_M = 1e-3
 _NO_LEVEL_DBM = 200.0
 _PRF_MHZ = 64
@@ -225,9 +225,9 @@ def rehearse(parameters: UwbSolverParameters, dimensions: int) -> None:
 
 
 def _variance(item: MeasuredRange, anchor: Anchor) -> float:
-    """Of the range and of where the anchor hangs; what no radio can claim counts as unknown."""
-    known = 0.0 < item.variance_m2 < math.inf
-    return (item.variance_m2 if known else _DEFAULT_VARIANCE_M2) + anchor.position_sd_m**2
+    """Of the range and of where the anchor hangs, within what a radio can mean; what it cannot counts as unknown."""
+    claimed = item.variance_m2 if 0.0 < item.variance_m2 < math.inf else _DEFAULT_VARIANCE_M2
+    return min(max(claimed, _LEAST_VARIANCE_M2), _MOST_VARIANCE_M2) + anchor.position_sd_m**2
 
 
 def _judgements(solution: Solution, measurements: Measurements) -> Iterable[tuple[Reason, float, float, int, float]]:

@@ -51,6 +51,7 @@ def _robust_tracker(p: UwbSolverParameters) -> Solver:
     return RobustTracker(
         RobustTrackerSettings(
             acceleration_density_m2_s3=p.acceleration_density,
+            systematic_sd_m=p.systematic_sd,
             nlos_scale_m=p.nlos_excess,
             nlos_share=p.nlos_share,
             path_loss=_path_loss(p),

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from numba import njit
 
 from mine_loc_uwb.fix import Array
-from mine_loc_uwb.geometry import direction, gdop
+from mine_loc_uwb.geometry import direction, inverse_information
 from mine_loc_uwb.one_sided_noise import deviance, score
 
 Integers = npt.NDArray[np.int64]
@@ -35,7 +35,7 @@ Integers = npt.NDArray[np.int64]
 ) = range(14)
 """Places of the settings in the array `noise`, and how many they are."""
 
-ACCEPTED, GATE, KINEMATIC = range(3)
+ACCEPTED, TOO_LONG, TOO_SHORT, IMPOSSIBLE = range(4)
 """What became of a range."""
 
 _OUTLIER_DENSITY_PER_M = 2e-4
@@ -127,6 +127,7 @@ def take_range(
     height_m: float,
     nlos_probability: float,
     nlos_scale_m: float,
+    fresh: float,
     reach_m: float,
     gate: float,
     work: Array,
@@ -135,7 +136,8 @@ def take_range(
 
     `nlos_probability` is the belief before. The distance's curvature over the spread of the position is allowed for to
     second order, because people pass anchors closely. `reach_m` is how far the person can have come since the last
-    fix. `work` is (3, size) of scratch.
+    fix. An excess that lasts is no new witness each time: it counts by the share `fresh` of its time that has gone.
+    `work` is (3, size) of scratch.
     """
     d, size, common, bias = dimensions, len(x), 2 * dimensions, 2 * dimensions + 1 + slot
     at, unit, gain = work[0], work[1], work[2]
@@ -159,9 +161,11 @@ def take_range(
     distance_sq = deviance(error, variance, nlos_probability, nlos_scale_m)
     if distance_sq > gate:
         impossible = error < -(reach_m + _IMPOSSIBLE_SDS * math.sqrt(variance))
-        return (KINEMATIC if impossible else GATE), distance_sq, nlos_probability
+        refused = TOO_LONG if error > 0.0 else IMPOSSIBLE if impossible else TOO_SHORT
+        return refused, distance_sq, nlos_probability
     first, second, nlos = score(error, variance, nlos_probability, nlos_scale_m, _OUTLIER_DENSITY_PER_M)
-    second = min(max(second, 0.0), 1.0 / variance)
+    witness = 1.0 - nlos * (1.0 - fresh)
+    first, second = witness * first, witness * min(max(second, 0.0), 1.0 / variance)
     for i in range(size):
         x[i] += first * gain[i]
         for j in range(i + 1):  # mirrored, because rounding that is not would grow with the square of time
@@ -221,6 +225,7 @@ def take_round(
     codes: Integers,
     deviances: Array,
     quality: Array,
+    dilution: Array,
 ) -> None:
     """Predict by `gone_s` and take all ranges of a round.
 
@@ -229,10 +234,12 @@ def take_round(
     given beside the range (`los_probability`, at even odds) shifts it. `offset_unknown` = 1 says that the ranges are
     arrivals with an unknown offset. Leaves in `codes` and `deviances` (n,) what became of each range, in `quality` (3,)
     how many were accepted, the root mean square of what they differ by from the new state [m], and their dilution of
-    precision.
+    precision;
+    in `dilution` (d, d) what geometry makes of a unit variance, 0 where it is singular.
     """
     work = np.empty((3, len(x)))
     predict(x, P, dimensions, gone_s, noise)
+    fresh = min(gone_s / noise[NLOS_TIME], 1.0)
     memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
     for slot in range(len(link_nlos)):  # of all links, heard or not
         link_nlos[slot] = share + memory * (link_nlos[slot] - share)
@@ -254,14 +261,14 @@ def take_round(
         belief = _shifted(link_nlos[slot], los_probability[number])
         codes[number], deviances[number], nlos = take_range(
             x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
-            height_m, belief, _scale_m(level_dbm[number], noise), gone_s * noise[TOP_SPEED], gate, work,
+            height_m, belief, _scale_m(level_dbm[number], noise), fresh, gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
         link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number])  # the judgement taken out again
     if noise[LEVEL_SD] > 0.0:
         for number in range(len(range_m)):
             if codes[number] == ACCEPTED and not math.isnan(level_dbm[number]):
                 take_level(x, P, dimensions, anchors_m[number], level_dbm[number], height_m, noise, work)
-    judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality)
+    judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, quality, dilution)
 
 
 @njit(cache=True)
@@ -275,8 +282,9 @@ def judge_round(
     height_m: float,
     codes: Integers,
     quality: Array,
+    dilution: Array,
 ) -> None:
-    """Leave in `quality` (3,) what `take_round` does, of the ranges that `codes` (n,) says were accepted."""
+    """Leave in `quality` (3,) and `dilution` (d, d) what `take_round` does, of ranges `codes` (n,) says were used."""
     d = dimensions
     at, unit, used, squares = np.empty(d), np.empty(d), np.zeros(len(range_m)), 0.0
     for number in range(len(range_m)):
@@ -289,7 +297,11 @@ def judge_round(
         used[number] = 1.0
     quality[0] = used.sum()
     quality[1] = math.sqrt(squares / quality[0]) if quality[0] > 0.0 else math.nan
-    quality[2] = gdop(x[:d], anchors_m, used, height_m)
+    quality[2] = math.inf
+    if inverse_information(x[:d], anchors_m, used, height_m, dilution):
+        quality[2] = math.sqrt(np.trace(dilution))
+    else:
+        dilution[:] = 0.0
 
 
 @njit(cache=True)

@@ -57,7 +57,7 @@ def test_half_of_the_anchors_agreeing_on_another_place_do_not_move_it(liars):
     wrong = (11.0, 8.0, 1.0)
     for _ in range(60):
         solution = track.round(excess=track.pretending(wrong, liars))
-        assert track.error_m(solution) < 0.4
+        assert track.error_m(solution) < 0.6
     assert set(solution.reasons) & {Reason.GATE, Reason.KINEMATIC, Reason.CAPTURE_GUARD}
 
 

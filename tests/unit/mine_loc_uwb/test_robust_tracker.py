@@ -208,15 +208,15 @@ def walk_by_its_own_model(seed: int, rounds: int) -> tuple[float, float]:
     s, rng, count = RobustTrackerSettings(), np.random.default_rng(seed), len(ROOM)
     position, velocity = np.array([*rng.uniform([5, 4], [15, 11]), 1.2]), np.array([*rng.normal(0.0, 0.6, 2), 0.0])
     biases = rng.normal(0.0, s.common_bias_sd_m) + rng.normal(0.0, s.bias_sd_m, count)
-    obstructed = rng.random(count) < s.nlos_share
+    excess = (rng.random(count) < s.nlos_share) * rng.exponential(s.nlos_scale_m, count)
     tracker = RobustTracker(s)
     for number in range(rounds):
         change = rng.normal(0.0, math.sqrt(s.acceleration_density_m2_s3 * PERIOD_S), 2)
         position[:2] += PERIOD_S * (velocity[:2] + change / 2.0)
         velocity[:2] += change
         drawn_anew = rng.random(count) < 1.0 - math.exp(-PERIOD_S / s.nlos_time_s)
-        obstructed = np.where(drawn_anew, rng.random(count) < s.nlos_share, obstructed)
-        excess = obstructed * rng.exponential(s.nlos_scale_m, count)
+        fresh = (rng.random(count) < s.nlos_share) * rng.exponential(s.nlos_scale_m, count)
+        excess = np.where(drawn_anew, fresh, excess)
         ranges = distances(ROOM, position) + biases + excess + rng.normal(0.0, 0.05, count)
         fix = tracker.solve(measurements(number * PERIOD_S, ROOM, ranges, height_m=1.2, sd_m=0.05)).fix
     error = (fix.position_m - position)[:2]
@@ -224,7 +224,7 @@ def walk_by_its_own_model(seed: int, rounds: int) -> tuple[float, float]:
 
 
 def test_on_its_own_model_it_errs_as_much_as_it_says_and_no_more_than_that_can_be():
-    """Half of all ranges are late by 0.6 m on average. The bound on the error is what forbids to pass by inflation."""
+    """Half of all links are late by 0.6 m on average, for a second. The bound on the error forbids inflation."""
     nees, errors_m = np.transpose([walk_by_its_own_model(seed, 50) for seed in range(150)])
     assert 0.7 < nees.mean() < 1.4
-    assert np.median(errors_m) < 0.06
+    assert np.median(errors_m) < 0.08

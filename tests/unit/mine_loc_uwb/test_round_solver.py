@@ -87,7 +87,7 @@ def test_a_frozen_anchor_does_not_hold_the_walker_back():
         place = (20.0 + 0.1 * number, 12.0, 1.0)
         fix, verdicts = rounds.solve([MeasuredRange(1, math.dist(PLACES[1], TAG), 0.01), *noisy(rng, tag=place)[1:]])
     assert reasons(verdicts) == [Reason.FROZEN] + [Reason.ACCEPTED] * 4
-    assert math.dist(fix.position_m, place) < 0.2
+    assert math.dist(fix.position_m, place) < 0.25
 
 
 def test_duplicates_within_a_round_do_not_count_as_repeats():

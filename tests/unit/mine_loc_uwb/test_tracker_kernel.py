@@ -75,10 +75,24 @@ def test_left_alone_biases_return_to_nothing_known():
     assert np.diag(P)[4:] == pytest.approx([SETTINGS.common_bias_sd_m**2] + 2 * [SETTINGS.bias_sd_m**2])
 
 
-def take(x, P, dimensions, anchor, range_m, *, nlos=0.0, since_s=0.0, gate=NO_GATE, variance=0.01, reach_m=0.3, slot=0):
+def take(
+    x,
+    P,
+    dimensions,
+    anchor,
+    range_m,
+    *,
+    nlos=0.0,
+    since_s=0.0,
+    gate=NO_GATE,
+    variance=0.01,
+    reach_m=0.3,
+    slot=0,
+    fresh=1.0,
+):
     return kernel.take_range(
         x, P, dimensions, np.asarray(anchor, float), slot, range_m, variance, since_s, 1.0, nlos, SETTINGS.nlos_scale_m,
-        reach_m, gate, np.empty((3, len(x))),
+        fresh, reach_m, gate, np.empty((3, len(x))),
     )  # fmt: skip
 
 
@@ -124,9 +138,9 @@ def test_any_range_leaves_a_finite_state_and_a_covariance_that_has_not_grown(see
 def test_a_refused_range_leaves_the_state_as_it_was():
     gate = 15.0
     for error_m, reach_m, wanted in (
-        (-45.0, 0.3, kernel.KINEMATIC),
-        (-3.0, 10.0, kernel.GATE),
-        (45.0, 0.3, kernel.GATE),
+        (-45.0, 0.3, kernel.IMPOSSIBLE),
+        (-3.0, 10.0, kernel.TOO_SHORT),
+        (45.0, 0.3, kernel.TOO_LONG),
     ):
         x, P = state(2, 2, 1)
         before = x.copy(), P.copy()
@@ -155,7 +169,7 @@ def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_unkno
     kernel.take_round(
         x, P, 2, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count), 1.0,
         np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos, gone_s,
-        offset_unknown, gate, NOISE, codes, deviances, quality,
+        offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((2, 2)),
     )  # fmt: skip
     return codes, deviances, quality
 
@@ -186,7 +200,7 @@ def test_the_quality_of_a_round_counts_what_was_accepted():
     ranges = distances(ROOM, (*x[:2], 1.0))
     ranges[2] -= 45.0
     codes, _, (used, rms, dilution) = play(x, P, ranges)
-    assert codes.tolist() == [kernel.ACCEPTED] * 2 + [kernel.KINEMATIC] + [kernel.ACCEPTED] * 3
+    assert codes.tolist() == [kernel.ACCEPTED] * 2 + [kernel.IMPOSSIBLE] + [kernel.ACCEPTED] * 3
     assert used == 5
     assert rms < 0.1
     assert 0.5 < dilution < 2.0
