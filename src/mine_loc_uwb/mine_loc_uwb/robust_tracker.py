@@ -33,13 +33,9 @@ _REASON = {
     kernel.TOO_LONG: Reason.GATE,
     kernel.TOO_SHORT: Reason.GATE,
     kernel.IMPOSSIBLE: Reason.KINEMATIC,
+    kernel.CONTESTED: Reason.AMBIGUOUS,
 }
 _MOST_LINKS = 16
-_MOST_COMMON_M2 = 5.0**2
-_HELD = 9.0
-"""A range within three deviations holds the place."""
-_CONTEST = 3
-"""Of so many ranges half must be believed, or none is: a few that are wrong alike would drag the track."""
 _LONGEST_DOUBT_STEP_S = 0.5
 """A silence is not doubt: one round after it adds no more than this."""
 _COASTED_S, _WIDE_M = 1.0, 1.0
@@ -95,6 +91,7 @@ class RobustTrackerSettings:
         values[kernel.NLOS_SCALE], values[kernel.NLOS_GROWTH] = self.nlos_scale_m, self.nlos_growth_per_db
         values[kernel.NLOS_TIME] = self.nlos_time_s
         values[kernel.NLOS_SHARE], values[kernel.TOP_SPEED] = self.nlos_share, self.top_speed_m_s
+        values[kernel.SYSTEMATIC_SD] = self.systematic_sd_m
         loss = self.path_loss
         values[kernel.LEVEL_1M] = loss.level_1m_dbm if loss else math.nan
         values[kernel.LEVEL_EXPONENT] = loss.exponent if loss else math.nan
@@ -113,7 +110,6 @@ class RobustTracker:
         self._started = False
         self._stamp_ns = self._trusted_ns = 0
         self._doubt_s = 0.0
-        self._dilution = np.zeros((0, 0))
         self._slot: dict[int, int] = {}
         self._known = b"", np.empty(0, np.int64)
         self._link_nlos = np.empty(0)
@@ -127,33 +123,27 @@ class RobustTracker:
         if found is not None:
             return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
-        codes, deviances, quality = np.empty(len(slots), np.int64), np.empty(len(slots)), np.empty(3)
-        self._dilution = np.zeros((measurements.dimensions, measurements.dimensions))
+        codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
+        quality, claimed_m2 = np.empty(kernel.QUALITIES), np.zeros((3, 3))
         offset_unknown = int(measurements.shared_offset and len(slots) > 0)
-        before = self._x.copy(), self._P.copy(), self._link_nlos.copy()
         kernel.take_round(
             self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
             measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
             measurements.receive_power_dbm, self._link_nlos, gone_s, offset_unknown, self._gate, self._noise,
-            codes, deviances, quality, self._dilution,
+            codes, deviances, quality, claimed_m2,
         )  # fmt: skip
         self._stamp_ns = measurements.stamp_ns
         reasons = tuple([_REASON[code] for code in codes.tolist()])
-        if 2.0 * quality[0] < len(codes) and len(codes) >= _CONTEST:
-            self._x, self._P, self._link_nlos = before
-            kernel.predict(self._x, self._P, measurements.dimensions, gone_s, self._noise)
-            quality[:] = 0.0, math.nan, math.inf
-            reasons = tuple([Reason.AMBIGUOUS if reason is Reason.ACCEPTED else reason for reason in reasons])
-        solution = Solution(self._fix(measurements, quality), reasons, deviances, self._gate)
-        if not len(codes):
+        used, rms, dilution, short, holding = quality.tolist()
+        fix = self._fix(measurements, claimed_m2, int(used), rms, dilution)
+        solution = Solution(fix, reasons, deviances, self._gate)
+        refused, held = len(reasons) - used, holding > measurements.dimensions
+        if not reasons:
             return solution
-        short = bool(np.any((codes == kernel.TOO_SHORT) | (codes == kernel.IMPOSSIBLE)))
-        held = np.count_nonzero((codes == kernel.ACCEPTED) & (deviances < _HELD)) > measurements.dimensions
-        refused = len(codes) - quality[0]
-        if refused > quality[0] or (not held and (short or refused == quality[0])):
+        if refused > used or (not held and (short or refused == used)):
             return self._doubt(measurements, solution, gone_s)
         self._doubt_s = 0.0
-        if quality[0] >= measurements.dimensions:
+        if used >= measurements.dimensions:
             self._trusted_ns = measurements.stamp_ns
         return solution
 
@@ -169,8 +159,7 @@ class RobustTracker:
         found = self._agreed_place(measurements)
         if found is not None and self._can_be_at(found, measurements.stamp_ns):
             return self._begin_at(found, measurements)
-        self._widen(measurements.dimensions)
-        solution = replace(solution, fix=replace(solution.fix, covariance_m2=self._covariance(measurements.dimensions)))
+        solution = replace(solution, fix=self._widened(solution.fix))
         if found is None:
             return solution
         refused = Reason.CAPTURE_GUARD
@@ -180,12 +169,15 @@ class RobustTracker:
         )
         return replace(solution, reasons=reasons)
 
-    def _widen(self, d: int) -> None:
+    def _widened(self, fix: Fix) -> Fix:
         """Let the spread be no less than a third of the way that can have been walked since the place was trusted."""
+        d, covariance_m2 = fix.dimensions, fix.covariance_m2.copy()
         way_m = self._settings.top_speed_m_s * (self._stamp_ns - self._trusted_ns) / NS_PER_S
         for axis in range(d):
             self._P[axis, axis] = max(self._P[axis, axis], (way_m / 3.0) ** 2)
             self._P[d + axis, d + axis] = max(self._P[d + axis, d + axis], self._settings.first_speed_sd_m_s**2)
+            covariance_m2[axis, axis] = max(covariance_m2[axis, axis], self._P[axis, axis])
+        return replace(fix, covariance_m2=covariance_m2)
 
     def _place_within_wide_spread(self, measurements: Measurements, gone_s: float) -> Consensus | None:
         """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
@@ -237,14 +229,17 @@ class RobustTracker:
         """Start where ranges agree; of two places that are as good all are believed."""
         self._place(measurements, found.position_m, found.covariance_m2)
         codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.TOO_LONG)
-        slots, quality = self._slots_of(measurements.anchor_ids), np.empty(3)
-        self._dilution = np.zeros((measurements.dimensions, measurements.dimensions))
+        slots, d = self._slots_of(measurements.anchor_ids), measurements.dimensions
+        quality, claimed_m2 = np.empty(kernel.QUALITIES), np.zeros((3, 3))
+        unknown = np.full(len(codes), math.nan)
         kernel.judge_round(
-            self._x, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
-            measurements.since_s, measurements.plane_m, codes, quality, self._dilution,
+            self._x, d, measurements.anchors_m, slots, measurements.range_m, measurements.since_s,
+            measurements.plane_m, codes, unknown, quality,
         )  # fmt: skip
+        kernel.claim(self._x, self._P, d, measurements.anchors_m, measurements.plane_m, codes, self._noise, claimed_m2)
+        used, rms, dilution, *_ = quality.tolist()
         reasons = tuple([_REASON[code] for code in codes.tolist()])
-        return Solution(self._fix(measurements, quality), reasons, np.full(len(codes), math.nan), self._gate)
+        return Solution(self._fix(measurements, claimed_m2, int(used), rms, dilution), reasons, unknown, self._gate)
 
     def _consensus(self, measurements: Measurements) -> Consensus | None:
         if measurements.shared_offset:
@@ -304,19 +299,8 @@ class RobustTracker:
         self._slot[anchor_id] = slot
         return slot
 
-    def _covariance(self, d: int) -> Array:
-        """Of the state, and what is common to each link through the geometry of the last round, up to some metres."""
-        covariance = np.zeros((3, 3))
-        covariance[:d, :d] = self._P[:d, :d]
-        common = self._settings.systematic_sd_m**2 * self._dilution
-        total = common.trace()
-        covariance[:d, :d] += common if total <= _MOST_COMMON_M2 else common * (_MOST_COMMON_M2 / total)
-        return covariance
-
-    def _fix(self, measurements: Measurements, quality: Array) -> Fix:
-        d = measurements.dimensions
-        position, covariance = self._x[:3].copy(), self._covariance(d)
+    def _fix(self, measurements: Measurements, claimed_m2: Array, used: int, rms_m: float, dilution: float) -> Fix:
+        position = self._x[:3].copy()
         if measurements.height_m is not None:
             position[2] = measurements.height_m
-        used, rms, dilution = quality.tolist()
-        return Fix(FixStatus.OK, position, covariance, d, int(used), rms, dilution)
+        return Fix(FixStatus.OK, position, claimed_m2, measurements.dimensions, used, rms_m, dilution)

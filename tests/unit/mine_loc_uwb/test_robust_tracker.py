@@ -228,3 +228,24 @@ def test_on_its_own_model_it_errs_as_much_as_it_says_and_no_more_than_that_can_b
     nees, errors_m = np.transpose([walk_by_its_own_model(seed, 50) for seed in range(150)])
     assert 0.7 < nees.mean() < 1.4
     assert np.median(errors_m) < 0.08
+
+
+def test_what_is_claimed_across_a_line_of_anchors_is_as_poor_as_it_is_known():
+    """Systematic errors of links do not average out: they go through the geometry, as a short baseline makes them."""
+    line = np.array([[0.0, 0.0, 2.4], [25.0, 0.6, 2.4], [50.0, -0.6, 2.4], [75.0, 0.0, 2.4]])
+    track = Track(Tag(18, anchors=line, start_m=(37.0, 2.0, 1.0)))
+    solution = track.play(5.0)
+    along_m, across_m = np.sqrt(np.diag(solution.fix.covariance_m2)[:2])
+    assert along_m < 0.3
+    assert across_m > 4.0 * along_m
+
+
+def test_a_place_that_ranges_are_too_short_for_is_left_though_most_ranges_are_taken_for_obstructed():
+    """Two clear ranges and one from round a corner, from a place that only the last one fits: example_mine's branch."""
+    anchors = np.array([[45.0, -1.8, 2.4], [43.2, 20.0, 2.4], [25.0, -1.8, 2.4], [70.0, 1.8, 2.4]])
+    track, wrong = Track(Tag(19, anchors=anchors, start_m=(45.0, 4.0, 1.0))), (50.0, -6.0, 1.0)
+    track.tracker.solve(measurements(0.0, anchors, distances(anchors, wrong), height_m=1.0))
+    for _ in range(60):
+        solution = track.round(only=[0, 1, 2], excess={2: 5.9})
+    assert track.error_m(solution) < 2.0 * sd_m(solution.fix)
+    assert track.error_m(solution) < 4.0

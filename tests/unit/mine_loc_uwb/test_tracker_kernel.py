@@ -165,11 +165,11 @@ def test_a_range_believed_obstructed_pulls_less_than_one_believed_clear():
 def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_unknown=0, gate=15.0):
     """A round of ranges of the room; codes, deviances and quality."""
     count = len(ranges)
-    codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(3)
+    codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(kernel.QUALITIES)
     kernel.take_round(
         x, P, 2, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count), 1.0,
         np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos, gone_s,
-        offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((2, 2)),
+        offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((3, 3)),
     )  # fmt: skip
     return codes, deviances, quality
 
@@ -199,9 +199,9 @@ def test_the_quality_of_a_round_counts_what_was_accepted():
     P *= 0.1
     ranges = distances(ROOM, (*x[:2], 1.0))
     ranges[2] -= 45.0
-    codes, _, (used, rms, dilution) = play(x, P, ranges)
+    codes, _, (used, rms, dilution, short, holding) = play(x, P, ranges)
     assert codes.tolist() == [kernel.ACCEPTED] * 2 + [kernel.IMPOSSIBLE] + [kernel.ACCEPTED] * 3
-    assert used == 5
+    assert (used, short, holding) == (5, 1, 5)
     assert rms < 0.1
     assert 0.5 < dilution < 2.0
 
@@ -209,7 +209,7 @@ def test_the_quality_of_a_round_counts_what_was_accepted():
 def test_a_round_of_nothing_is_a_prediction_with_no_quality():
     x, P = state(6, 2, 2)
     expected = van_loan(2, 2, 0.1)[0] @ x
-    _, _, (used, rms, dilution) = play(x, P, [])
+    _, _, (used, rms, dilution, *_) = play(x, P, [])
     assert x == pytest.approx(expected)
     assert (used, dilution) == (0, math.inf)
     assert math.isnan(rms)
