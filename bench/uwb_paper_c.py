@@ -34,8 +34,9 @@ from mine_loc_uwb.fix import Fix, FixStatus
 from mine_loc_uwb.least_squares import LeastSquares
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.received_power import los_probability_from_powers, odds_of_power_rule
-from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
+from mine_loc_uwb.robust_tracker import RobustTracker
 from mine_loc_uwb.solver import Solution
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings, advance
 
 SCENE = Path(__file__).parent / "uwb_scenes" / "vehicle"

@@ -23,9 +23,10 @@ from mine_loc_uwb.ekf import Ekf, EkfParameters
 from mine_loc_uwb.late_arrival import LateArrival
 from mine_loc_uwb.particle_filter import ParticleFilter, ParticleFilterParameters
 from mine_loc_uwb.path_loss import PathLoss, fit_path_loss
-from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
+from mine_loc_uwb.robust_tracker import RobustTracker
 from mine_loc_uwb.solver import Solver
 from mine_loc_uwb.tdoa_rss import TdoaRss
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 CHOSEN = Path(__file__).parent / "uwb_scenes" / "paper_d.json"
 TUNING_SEEDS = range(1000, 1010)

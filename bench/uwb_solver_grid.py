@@ -8,7 +8,8 @@ from uwb_tracks import MakeSolver
 from mine_loc_uwb.ekf import Ekf, EkfParameters
 from mine_loc_uwb.least_squares import LeastSquares
 from mine_loc_uwb.particle_filter import ParticleFilter, ParticleFilterParameters
-from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
+from mine_loc_uwb.robust_tracker import RobustTracker
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings
 
 LARGE_GDOP = 1e3

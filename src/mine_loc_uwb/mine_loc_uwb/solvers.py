@@ -9,9 +9,10 @@ from mine_loc_uwb.least_squares import LeastSquares
 from mine_loc_uwb.parameters import UwbSolverParameters
 from mine_loc_uwb.particle_filter import ParticleFilter, ParticleFilterParameters
 from mine_loc_uwb.path_loss import PathLoss
-from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
+from mine_loc_uwb.robust_tracker import RobustTracker
 from mine_loc_uwb.solver import Solver
 from mine_loc_uwb.tdoa_rss import TdoaRss
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings
 
 MakeSolver = Callable[[UwbSolverParameters], Solver]

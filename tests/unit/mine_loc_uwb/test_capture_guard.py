@@ -5,7 +5,7 @@ import pytest
 from uwb_scenes import PERIOD_S, ROOM, Track, sd_m, tracked
 
 from mine_loc_core.verdicts import Reason
-from mine_loc_uwb.robust_tracker import RobustTrackerSettings
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 HALL = ROOM * [3.0, 3.0, 1.0]
 SOMEWHERE = (20.0, 20.0, 1.0)

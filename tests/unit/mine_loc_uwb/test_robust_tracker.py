@@ -10,7 +10,8 @@ from uwb_scenes import LINE, PERIOD_S, ROOM, Tag, Track, distances, is_covarianc
 
 from mine_loc_core.verdicts import Reason
 from mine_loc_uwb.fix import FixStatus
-from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
+from mine_loc_uwb.robust_tracker import RobustTracker
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 SEEDS = st.integers(0, 2**32 - 1)
 

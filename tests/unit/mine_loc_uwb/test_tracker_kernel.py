@@ -10,7 +10,8 @@ from scipy.linalg import expm
 from uwb_scenes import ROOM, distances, is_covariance
 
 from mine_loc_uwb import tracker_kernel as kernel
-from mine_loc_uwb.robust_tracker import RobustTrackerSettings
+from mine_loc_uwb import tracker_round
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 SETTINGS = RobustTrackerSettings()
 NOISE = SETTINGS.noise()
@@ -165,8 +166,8 @@ def test_a_range_believed_obstructed_pulls_less_than_one_believed_clear():
 def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_unknown=0, gate=15.0):
     """A round of ranges of the room; codes, deviances and quality."""
     count = len(ranges)
-    codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(kernel.QUALITIES)
-    kernel.take_round(
+    codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(tracker_round.QUALITIES)
+    tracker_round.take_round(
         x, P, 2, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count), 1.0,
         np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos, gone_s,
         offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((3, 3)),
@@ -225,9 +226,9 @@ def test_belief_in_an_obstruction_fades_to_the_share_of_obstructed_links_while_t
 
 @pytest.mark.parametrize(("los", "low", "high"), [(0.0, 0.97, 0.97), (1.0, 0.01, 0.01), (0.5, 0.5, 0.5)])
 def test_a_judgement_of_the_link_shifts_the_belief_within_its_bounds(los, low, high):
-    assert low <= kernel._shifted(0.5, los) <= high
+    assert low <= tracker_round._shifted(0.5, los) <= high
 
 
 def test_no_judgement_leaves_the_belief():
-    assert kernel._shifted(0.3, math.nan) == 0.3
-    assert kernel._shifted(0.3, 0.8) == pytest.approx(0.3 * 0.2 / (0.3 * 0.2 + 0.7 * 0.8))
+    assert tracker_round._shifted(0.3, math.nan) == 0.3
+    assert tracker_round._shifted(0.3, 0.8) == pytest.approx(0.3 * 0.2 / (0.3 * 0.2 + 0.7 * 0.8))

@@ -6,7 +6,8 @@ import numpy as np
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_uwb.measurements import Measurements
-from mine_loc_uwb.robust_tracker import RobustTracker, RobustTrackerSettings
+from mine_loc_uwb.robust_tracker import RobustTracker
+from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 ROOM = np.array(
     [[0.0, 0.0, 2.4], [20.0, 0.0, 2.8], [20.0, 15.0, 2.4], [0.0, 15.0, 2.8], [10.0, -2.0, 0.4], [9.0, 17.0, 2.0]]
