@@ -69,7 +69,11 @@ def heard(graph: LiveGraph) -> dict[str, Heard]:
 
     def tracked() -> bool:
         modes = [item.mode for array in poses[-40:] for item in array.people]
-        return modes.count(PersonPose.UWB_PDR) == 40
+        if modes.count(PersonPose.UWB_PDR) != 40:
+            return False
+        transforms = [t for message in topics["tf"].messages for t in message.transforms]
+        odometry = [to_stamp_ns(t.header.stamp) for t in transforms if t.child_frame_id == "walker/base_link"]
+        return min(odometry, default=math.inf) <= to_stamp_ns(poses[-40].header.stamp)
 
     graph.observer.wait_for(tracked, 40.0, "four seconds in mode UWB_PDR")
     return topics
