@@ -13,6 +13,8 @@ from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 from mine_loc_uwb.weighted_lm import WeightedLmFilter, WeightedLmSettings
 
 LARGE_GDOP = 1e3
+CALIBRATED_SD_M = 0.02
+"""What a link's constants, found on another run, leave open."""
 DENSITIES = (0.1, 0.2, 0.5)
 
 
@@ -21,7 +23,10 @@ def candidates() -> Mapping[str, Mapping[str, MakeSolver]]:
     lm, ekf, particles, tracker = {}, {}, {}, {}
     for q, error_m in itertools.product(DENSITIES, (0.02, 0.05)):
         lm[f"q={q} floor={error_m}"] = _weighted_lm(WeightedLmSettings(q, error_m, max_gdop=LARGE_GDOP))
-        tracker[f"q={q} bias={error_m}"] = _robust_tracker(RobustTrackerSettings(q, error_m))
+    for q, share in itertools.product(DENSITIES, (0.1, 0.5)):
+        tracker[f"q={q} nlos_share={share}"] = _robust_tracker(
+            RobustTrackerSettings(q, CALIBRATED_SD_M, nlos_share=share, systematic_sd_m=CALIBRATED_SD_M)
+        )
     for jerk, error_m in itertools.product((0.03, 0.1, 0.3), (0.05, 0.1)):
         ekf[f"jerk={jerk} excess={error_m}"] = _ekf(
             EkfParameters(jerk_density_m2_s5=jerk, excess_sd_m=error_m, max_gdop=LARGE_GDOP)
