@@ -66,8 +66,9 @@ def test_a_left_turn_leads_to_the_left_however_the_imu_is_worn(roll_pitch):
     first, last = np.array((math.cos(steps[3].heading_rad), math.sin(steps[3].heading_rad))), (pose.x_m, pose.y_m)
     speed_m_s = 1.8 * 0.702
     leg_and_radius_m = 10.0 * speed_m_s + speed_m_s / (math.pi / 4)
-    assert np.dot(first, last) == pytest.approx(leg_and_radius_m, abs=0.8)
-    assert first[0] * last[1] - first[1] * last[0] == pytest.approx(leg_and_radius_m, abs=0.8)
+    assert np.dot(first, last) == pytest.approx(leg_and_radius_m, abs=1.0)
+    # the last step may still be on its way
+    assert first[0] * last[1] - first[1] * last[0] == pytest.approx(leg_and_radius_m, abs=1.0)
 
 
 def test_standing_makes_no_step_and_no_way_while_the_heading_gets_less_sure():
