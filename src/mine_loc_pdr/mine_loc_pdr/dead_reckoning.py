@@ -121,6 +121,11 @@ class PedestrianDeadReckoning:
         return OdometryPose(self._last.stamp_ns, self._x_m, self._y_m, self._attitude.heading_rad, covariance)
 
     @property
+    def heading_rad(self) -> float | None:
+        """Where the waist faces in odom at the last sample; None before the horizon is found."""
+        return None if self._attitude is None else self._attitude.heading_rad
+
+    @property
     def bias_sd_rad_s(self) -> float:
         """Standard deviation of the gyro bias about the vertical, which says how fast the heading may drift."""
         return math.sqrt(self._drift.covariance[BIAS, BIAS])

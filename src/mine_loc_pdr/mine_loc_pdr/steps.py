@@ -41,7 +41,7 @@ class StepThresholds:
     # Shifting one's weight while standing, and the push that begins a walk, also make a peak and a valley.
     start_peak_m_s2: float = 1.0
     peak_m_s2: float = 0.15
-    peak_share: float = 0.3  # of the usual peak of this walk
+    peak_share: float = 0.2  # of the usual peak of this walk
     valley_m_s2: float = 0.05
     weak_peak_m_s2: float = 0.04
     weak_valley_m_s2: float = 0.01

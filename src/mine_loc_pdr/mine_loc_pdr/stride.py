@@ -47,7 +47,7 @@ class StrideModel:
     scale: float = 1.0
     scale_variance: float = UNCALIBRATED_SCALE_VARIANCE
 
-    def length_m(self, frequency_hz: float | None, swing_m_s2: float = 0.0) -> float:
+    def length_m(self, frequency_hz: float | None, swing_m_s2: float = 0.0) -> float:  # noqa: ARG002
         """See StepLengthModel; the swing plays no part."""
         faster_hz = 0.0 if frequency_hz is None else frequency_hz - TYPICAL_FREQUENCY_HZ
         by_height_m = self.alpha * (self.height_m - TYPICAL_HEIGHT_M)
