@@ -24,6 +24,8 @@ CLOCK_JUMP_NS = NS_PER_S  # a step back by more is a new clock, not a late sampl
 FACING_SPAN_NS = LONGEST_INTERVAL_NS + NS_PER_S  # a step is reported within a second
 LARGEST_RATE_RAD_S = 100.0  # beyond the range of any such sensor, as is
 LARGEST_FORCE_M_S2 = 1000.0
+# Below the range of any gyro. No rate so fast repeats to the last bit, unless it is clipped.
+SATURATION_RAD_S = 4.0
 MISSED_STEP_SHARE = 0.05  # measured: recall 0.946 on people 1 to 7 of ipol_gait_lowerback
 # Assumed: walking direction against the mean facing of the waist over one step.
 DIRECTION_SD_RAD = math.radians(6.0)
@@ -69,7 +71,8 @@ class PedestrianDeadReckoning:
     """Carries one person's track from step to step.
 
     `faults` counts what was not usable: not_finite, out_of_range, duplicate and backward samples are dropped;
-    no_gravity puts the start off; gaps and clock_jumps are carried over with the covariance grown accordingly.
+    no_gravity puts the start off; gaps, clock_jumps and saturated rates are carried over with the covariance grown
+    accordingly.
     """
 
     def __init__(
@@ -132,7 +135,11 @@ class PedestrianDeadReckoning:
 
     def _initialise(self, sample: ImuSample) -> None:
         initial = self._initial
-        if initial and not 0 < sample.stamp_ns - initial[-1].stamp_ns <= LONGEST_DT_NS:
+        dt_ns = sample.stamp_ns - initial[-1].stamp_ns if initial else 0
+        if initial and -CLOCK_JUMP_NS <= dt_ns <= 0:
+            self.faults["backward" if dt_ns else "duplicate"] += 1
+            return
+        if not 0 <= dt_ns <= LONGEST_DT_NS:
             initial.clear()
         initial.append(sample)
         if sample.stamp_ns - initial[0].stamp_ns < INITIAL_SPAN_NS:
@@ -161,6 +168,10 @@ class PedestrianDeadReckoning:
 
     def _advance(self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float) -> StepEvent | None:
         (ax, ay, az), (bx, by, bz) = last.rate_rad_s, sample.rate_rad_s
+        if clipped_rad_s := _clipped(last.rate_rad_s, sample.rate_rad_s):
+            self.faults["saturated"] += 1
+            self._carry_drift()
+            self._drift.saturation(clipped_rad_s * dt_s)
         attitude.update(dt_s, (0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)), sample.force_m_s2)
         if resting_rate := self._rest.push(dt_s, sample.rate_rad_s, sample.force_m_s2):
             self._learn_bias(attitude, resting_rate)
@@ -233,3 +244,8 @@ def _fault(sample: ImuSample) -> str | None:
     if max(map(abs, sample.rate_rad_s)) > LARGEST_RATE_RAD_S or max(map(abs, sample.force_m_s2)) > LARGEST_FORCE_M_S2:
         return "out_of_range"
     return None
+
+
+def _clipped(before: Vector3, now: Vector3) -> float:
+    """The largest turn rate in rad/s that stands at a limit, 0 if none does."""
+    return max(abs(b) if a == b and abs(b) >= SATURATION_RAD_S else 0.0 for a, b in zip(before, now, strict=True))

@@ -21,7 +21,7 @@ MEAN_WINDOW_NS = 120 * NS_PER_MS
 SHORTEST_INTERVAL_NS = 300 * NS_PER_MS
 LONGEST_INTERVAL_NS = 1500 * NS_PER_MS  # what comes later starts a new walk
 # The heel strikes this long after the smoothed acceleration rises through zero: median over ipol_gait_lowerback.
-STRIKE_AFTER_RISE_NS = 105 * NS_PER_MS
+STRIKE_AFTER_RISE_NS = 65 * NS_PER_MS
 # Half waves of the slowest walk; what takes longer is no step, and would be reported late.
 _LONGEST_PEAK_NS = 550 * NS_PER_MS
 _LONGEST_WAIT_NS = 200 * NS_PER_MS  # from the zero crossing to the valley's threshold
@@ -34,8 +34,8 @@ _FIRST_INTERVAL_S = 0.55  # until a walk has shown its own
 class StepThresholds:
     """Of the smoothed vertical acceleration in m/s², chosen by leave-one-subject-out on ipol_gait_lowerback.
 
-    `python bench/pdr.py --only ipol` repeats the choice of the two that matter most, `start_peak_m_s2` and
-    `peak_share`.
+    `python bench/pdr.py --only ipol` repeats the choice of the three that matter most: `start_peak_m_s2`, `peak_share`
+    and `weak_peak_m_s2`.
     """
 
     # Shifting one's weight while standing, and the push that begins a walk, also make a peak and a valley.

@@ -16,6 +16,8 @@ TYPICAL_FREQUENCY_HZ = 1.79
 UNCALIBRATED_SCALE_VARIANCE = 0.13**2
 PENDULUM_SCALE_VARIANCE = 0.06**2
 PENDULUM_FACTOR = 0.42  # least squares over the same walks
+# No one walks with longer steps, by body height; a knock, or a step missed before, must not make one.
+LONGEST_STEP_SHARE = 0.6
 # Assumed: step to step at constant frequency, no public recording at hand measures single steps.
 STEP_TO_STEP_SD_M = 0.06
 
@@ -71,7 +73,8 @@ class PendulumStrideModel:
     def length_m(self, frequency_hz: float | None, swing_m_s2: float) -> float:
         """See StepLengthModel."""
         rise = math.sqrt(self.height_m * swing_m_s2)
-        return PENDULUM_FACTOR * rise / (frequency_hz or TYPICAL_FREQUENCY_HZ) * self.scale
+        length_m = PENDULUM_FACTOR * rise / (frequency_hz or TYPICAL_FREQUENCY_HZ)
+        return min(length_m, LONGEST_STEP_SHARE * self.height_m) * self.scale
 
 
 def common_variance_m2(model: StepLengthModel, length_m: float) -> float:

@@ -37,7 +37,7 @@ def test_a_step_is_stamped_at_its_strike_after_the_rise_and_reported_within_four
     steps = detect(walk(20, 1.8))
     for reported_ns, step in steps:
         phase = ((step.stamp_ns - 10**18) / NS_PER_S * 1.8) % 1.0
-        assert phase == pytest.approx(0.105 * 1.8, abs=0.02)
+        assert phase == pytest.approx(0.065 * 1.8, abs=0.02)
         assert reported_ns - step.stamp_ns < 400 * NS_PER_MS
 
 

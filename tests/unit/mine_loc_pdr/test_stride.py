@@ -42,6 +42,11 @@ def test_the_pendulum_steps_further_with_more_swing_height_and_time():
     assert PendulumStrideModel(1.75, scale=1.1).length_m(1.79, 3.5) == pytest.approx(1.1 * usual)
 
 
+def test_no_knock_makes_a_step_longer_than_people_are_able_to():
+    assert PendulumStrideModel(1.75).length_m(1.79, 2000.0) == PendulumStrideModel(1.75).length_m(0.7, 50.0)
+    assert PendulumStrideModel(1.75).length_m(1.79, 2000.0) == pytest.approx(0.6 * 1.75)
+
+
 def test_the_person_chooses_the_model():
     linear = Person("a", 0, 1.8, None, Stride(0.9, 0.3, 0.2, "paper_b"), None)
     pendulum = Person("a", 0, 1.8, None, Stride(0.9), None)
