@@ -1,5 +1,6 @@
 """Heading over a U-turn and the way back to the start, beside plain gyro integration, imufusion and ahrs."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 from gait_recordings import RATE_HZ, Array
 from pdr_recordings import STANDARD_GRAVITY_M_S2, START_NS, Recording
 from pdr_tracks import HALT_S, Track, inside, spread
+
+from mine_loc_pdr.attitude import AttitudeFilter, turned
 
 _STANDING_S = 0.5  # at the start, for the first horizon, as dead reckoning takes it
 Heading = tuple[Array, Array]  # times in s, heading in rad, unwrapped
@@ -20,6 +23,19 @@ def plain_gyro(recording: Recording) -> Heading:
     up = recording.force_m_s2[: int(_STANDING_S * RATE_HZ)].mean(axis=0)
     rate = recording.rate_rad_s @ (up / np.linalg.norm(up))
     return times_s, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(times_s))])
+
+
+def paper_b(recording: Recording) -> Heading:
+    """Its quaternion integration and heading (equations 4 to 6) from a level start: no bias, no gravity afterwards."""
+    times_s = (recording.stamps_ns - START_NS) * 1e-9
+    fx, fy, fz = recording.force_m_s2[: int(_STANDING_S * RATE_HZ)].mean(axis=0).tolist()
+    q = AttitudeFilter((fx, fy, fz)).orientation_imu
+    yaw = []
+    for dt_s, rate in zip(np.diff(times_s, prepend=times_s[0]).tolist(), recording.rate_rad_s.tolist(), strict=True):
+        q = turned(q, rate[0] * dt_s, rate[1] * dt_s, rate[2] * dt_s)
+        w, x, y, z = q
+        yaw.append(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    return times_s, np.unwrap(yaw)
 
 
 def with_imufusion(recording: Recording) -> Heading:
@@ -50,6 +66,7 @@ def with_ahrs(recording: Recording) -> Heading:
 
 PEERS: Mapping[str, Callable[[Recording], Heading]] = {
     "plain_gyro": plain_gyro,
+    "paper_b_quaternion": paper_b,
     "imufusion": with_imufusion,
     "ahrs_madgwick": with_ahrs,
 }

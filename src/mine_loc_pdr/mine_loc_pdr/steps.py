@@ -43,7 +43,7 @@ class StepThresholds:
     peak_m_s2: float = 0.15
     peak_share: float = 0.2  # of the usual peak of this walk
     valley_m_s2: float = 0.05
-    weak_peak_m_s2: float = 0.04
+    weak_peak_m_s2: float = 0.08
     weak_valley_m_s2: float = 0.01
     weak_interval: tuple[float, float] = (0.6, 1.6)  # of the usual interval
 
