@@ -13,22 +13,28 @@ from pdr_tracks import HALT_S, Track, inside, spread
 
 from mine_loc_pdr.attitude import AttitudeFilter, turned
 
-_STANDING_S = 0.5  # at the start, for the first horizon, as dead reckoning takes it
+_LEVELLING_S = 0.5  # at the start, for the first horizon, as dead reckoning takes it
+_STANDING_S = 3.0  # nobody walks before: peers are given the gyro's bias, which ours has to find
 Heading = tuple[Array, Array]  # times in s, heading in rad, unwrapped
 
 
+def unbiased(recording: Recording) -> Array:
+    """Rates less the mean of the first seconds, (n, 3) rad/s."""
+    return recording.rate_rad_s - recording.rate_rad_s[: int(_STANDING_S * RATE_HZ)].mean(axis=0)
+
+
 def plain_gyro(recording: Recording) -> Heading:
-    """The turn rate about the vertical of the start, integrated: no bias, no gravity afterwards."""
+    """The turn rate about the vertical of the start, integrated: no gravity afterwards."""
     times_s = (recording.stamps_ns - START_NS) * 1e-9
-    up = recording.force_m_s2[: int(_STANDING_S * RATE_HZ)].mean(axis=0)
-    rate = recording.rate_rad_s @ (up / np.linalg.norm(up))
+    up = recording.force_m_s2[: int(_LEVELLING_S * RATE_HZ)].mean(axis=0)
+    rate = unbiased(recording) @ (up / np.linalg.norm(up))
     return times_s, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(times_s))])
 
 
 def paper_b(recording: Recording) -> Heading:
     """Its quaternion integration and heading (equations 4 to 6) from a level start: no bias, no gravity afterwards."""
     times_s = (recording.stamps_ns - START_NS) * 1e-9
-    fx, fy, fz = recording.force_m_s2[: int(_STANDING_S * RATE_HZ)].mean(axis=0).tolist()
+    fx, fy, fz = recording.force_m_s2[: int(_LEVELLING_S * RATE_HZ)].mean(axis=0).tolist()
     q = AttitudeFilter((fx, fy, fz)).orientation_imu
     yaw = []
     for dt_s, rate in zip(np.diff(times_s, prepend=times_s[0]).tolist(), recording.rate_rad_s.tolist(), strict=True):
@@ -42,7 +48,7 @@ def with_imufusion(recording: Recording) -> Heading:
     """Its AHRS and its bias estimator with their default settings."""
     times_s = (recording.stamps_ns - START_NS) * 1e-9
     fusion, bias = imufusion.Ahrs(), imufusion.Bias()
-    gyro, force = np.degrees(recording.rate_rad_s), recording.force_m_s2 / STANDARD_GRAVITY_M_S2
+    gyro, force = np.degrees(unbiased(recording)), recording.force_m_s2 / STANDARD_GRAVITY_M_S2
     yaw = []
     for dt_s, rate, acceleration in zip(np.diff(times_s, prepend=times_s[0] - 1.0 / RATE_HZ), gyro, force, strict=True):
         fusion.set_sample_period(float(dt_s))
@@ -59,7 +65,7 @@ def with_ahrs(recording: Recording) -> Heading:
     def on_grid(table: Array) -> Array:
         return np.stack([np.interp(grid_s, times_s, column) for column in table.T], axis=1)
 
-    q = ahrs.filters.Madgwick(gyr=on_grid(recording.rate_rad_s), acc=on_grid(recording.force_m_s2), frequency=RATE_HZ).Q
+    q = ahrs.filters.Madgwick(gyr=on_grid(unbiased(recording)), acc=on_grid(recording.force_m_s2), frequency=RATE_HZ).Q
     w, x, y, z = q.T
     return grid_s, np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 
