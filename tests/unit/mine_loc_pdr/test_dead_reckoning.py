@@ -289,7 +289,7 @@ def ipol_trials(subjects):
 
 @pytest.mark.data
 def test_real_walks_are_counted_within_five_percent_and_u_turns_read_as_180_degrees():
-    """People 8 to 13 of ipol_gait_lowerback, none of whom took part in choosing the thresholds."""
+    """A guard against regressions on people 8 to 13 of ipol_gait_lowerback; bench/pdr.py scores people held out."""
     count_errors, turns_deg = [], []
     for truth, table in ipol_trials(range(8, 14)):
         samples = [
@@ -306,4 +306,4 @@ def test_real_walks_are_counted_within_five_percent_and_u_turns_read_as_180_degr
         turns_deg.append(abs(np.degrees(np.angle(np.sum(back) / np.sum(out)))))
     assert len(count_errors) > 30
     assert np.mean(count_errors) < 0.05
-    assert np.median(np.abs(np.array(turns_deg) - 180.0)) < 5.0
+    assert np.median(np.abs(np.array(turns_deg) - 180.0)) < 3.5
