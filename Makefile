@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los lock clean
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -36,6 +36,9 @@ bench-uwb: setup ## the UWB solvers against papers, recordings and libraries (be
 
 bench-los: setup ## the LOS/NLOS classifier on placements and scenes it never saw (bench/results/los.json)
 	@$(run) python bench/los.py
+
+bench-pdr: setup ## dead reckoning on recordings of waists and phones (bench/results/pdr.json)
+	@$(run) python bench/pdr.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

@@ -25,11 +25,14 @@ class N100:
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """Step-length model of paper B: SL = [0.7 + alpha (H − 1.75) + beta (SF − 1.79) H / 1.75] k."""
+    """Step-length model: "paper_b" is SL = [0.7 + alpha (H − 1.75) + beta (SF − 1.79) H / 1.75] k; "pendulum" goes by
+    the vertical swing of the waist, times k.
+    """
 
     k: float = 1.0
     alpha: float = 0.371
     beta: float = 0.227
+    model: str = "pendulum"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +125,15 @@ def _person(item: Mapping[str, Any]) -> Person:
         tag_id=device_id(item.get("tag_id", 0)),
         height_m=float(item["height_m"]),
         n100=_n100(item["n100"]) if "n100" in item else None,
-        stride=Stride(**{name: float(value) for name, value in item.get("stride", {}).items()}),
+        stride=_stride(item.get("stride", {})),
         tag_height_m=float(item["tag_height_m"]) if "tag_height_m" in item else None,
     )
+
+
+def _stride(item: Mapping[str, Any]) -> Stride:
+    """Coefficients of paper B's model choose it, where no model is named."""
+    numbers = {name: float(value) for name, value in item.items() if name != "model"}
+    return Stride(**numbers, model=item.get("model", "paper_b" if {"alpha", "beta"} & item.keys() else "pendulum"))
 
 
 def _n100(item: Mapping[str, Any]) -> N100:

@@ -15,8 +15,8 @@ from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns, to_s
 from mine_loc_pdr.attitude import STANDARD_GRAVITY_M_S2, AttitudeFilter, Vector3
 from mine_loc_pdr.drift import BIAS, HEADING, DriftModel, X, Y
 from mine_loc_pdr.rest import RestDetector
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, Step, StepDetector
-from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StrideModel
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, Step, StepDetector, StepThresholds
+from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2
 
 INITIAL_SPAN_NS = 500 * NS_PER_MS  # of force averaged for the first horizon
 LONGEST_DT_NS = 200 * NS_PER_MS  # beyond it the motion in between is unknown
@@ -24,7 +24,9 @@ CLOCK_JUMP_NS = NS_PER_S  # a step back by more is a new clock, not a late sampl
 FACING_SPAN_NS = LONGEST_INTERVAL_NS + NS_PER_S  # a step is reported within a second
 LARGEST_RATE_RAD_S = 100.0  # beyond the range of any such sensor, as is
 LARGEST_FORCE_M_S2 = 1000.0
-MISSED_STEP_SHARE = 0.05  # measured: recall 0.953 on people 1 to 7 of ipol_gait_lowerback
+# Below the range of any gyro. No rate so fast repeats to the last bit, unless it is clipped.
+SATURATION_RAD_S = 4.0
+MISSED_STEP_SHARE = 0.05  # measured: recall 0.946 on people 1 to 7 of ipol_gait_lowerback
 # Assumed: walking direction against the mean facing of the waist over one step.
 DIRECTION_SD_RAD = math.radians(6.0)
 
@@ -69,14 +71,20 @@ class PedestrianDeadReckoning:
     """Carries one person's track from step to step.
 
     `faults` counts what was not usable: not_finite, out_of_range, duplicate and backward samples are dropped;
-    no_gravity puts the start off; gaps and clock_jumps are carried over with the covariance grown accordingly.
+    no_gravity puts the start off; gaps, clock_jumps and saturated rates are carried over with the covariance grown
+    accordingly.
     """
 
-    def __init__(self, stride: StrideModel, forward_imu: Vector3 = (1.0, 0.0, 0.0)) -> None:
+    def __init__(
+        self,
+        stride: StepLengthModel,
+        forward_imu: Vector3 = (1.0, 0.0, 0.0),
+        thresholds: StepThresholds | None = None,
+    ) -> None:
         """`forward_imu`: the unit vector in the IMU's axes that points to the front of the body."""
         self._stride = stride
         self._forward_imu = forward_imu
-        self._detector = StepDetector()
+        self._detector = StepDetector(thresholds)
         self._rest = RestDetector()
         self._drift = DriftModel(stride.scale_variance)
         self._attitude: AttitudeFilter | None = None
@@ -116,13 +124,22 @@ class PedestrianDeadReckoning:
         return OdometryPose(self._last.stamp_ns, self._x_m, self._y_m, self._attitude.heading_rad, covariance)
 
     @property
+    def heading_rad(self) -> float | None:
+        """Where the waist faces in odom at the last sample; None before the horizon is found."""
+        return None if self._attitude is None else self._attitude.heading_rad
+
+    @property
     def bias_sd_rad_s(self) -> float:
         """Standard deviation of the gyro bias about the vertical, which says how fast the heading may drift."""
         return math.sqrt(self._drift.covariance[BIAS, BIAS])
 
     def _initialise(self, sample: ImuSample) -> None:
         initial = self._initial
-        if initial and not 0 < sample.stamp_ns - initial[-1].stamp_ns <= LONGEST_DT_NS:
+        dt_ns = sample.stamp_ns - initial[-1].stamp_ns if initial else 0
+        if initial and -CLOCK_JUMP_NS <= dt_ns <= 0:
+            self.faults["backward" if dt_ns else "duplicate"] += 1
+            return
+        if not 0 <= dt_ns <= LONGEST_DT_NS:
             initial.clear()
         initial.append(sample)
         if sample.stamp_ns - initial[0].stamp_ns < INITIAL_SPAN_NS:
@@ -151,6 +168,10 @@ class PedestrianDeadReckoning:
 
     def _advance(self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float) -> StepEvent | None:
         (ax, ay, az), (bx, by, bz) = last.rate_rad_s, sample.rate_rad_s
+        if clipped_rad_s := _clipped(last.rate_rad_s, sample.rate_rad_s):
+            self.faults["saturated"] += 1
+            self._carry_drift()
+            self._drift.saturation(clipped_rad_s * dt_s)
         attitude.update(dt_s, (0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)), sample.force_m_s2)
         if resting_rate := self._rest.push(dt_s, sample.rate_rad_s, sample.force_m_s2):
             self._learn_bias(attitude, resting_rate)
@@ -176,7 +197,7 @@ class PedestrianDeadReckoning:
         self._carry_drift()
         self._drift.turn(math.remainder(heading_rad - self._step_heading_rad, math.tau))
         self._step_heading_rad = heading_rad
-        length_m = self._stride.length_m(self._frequency_hz(step))
+        length_m = self._stride.length_m(self._frequency_hz(step), step.swing_m_s2)
         dx_m, dy_m = length_m * math.cos(heading_rad), length_m * math.sin(heading_rad)
         own_variance_m2 = STEP_TO_STEP_SD_M**2 + (1.0 - step.confidence) * length_m**2
         along_sd_m = math.sqrt(own_variance_m2 + MISSED_STEP_SHARE * length_m**2)
@@ -189,7 +210,7 @@ class PedestrianDeadReckoning:
             self.step_count,
             step.interval_s,
             length_m,
-            self._stride.common_variance_m2(length_m) + own_variance_m2,
+            common_variance_m2(self._stride, length_m) + own_variance_m2,
             heading_rad,
             float(self._drift.covariance[HEADING, HEADING]) + DIRECTION_SD_RAD**2,
             self._x_m,
@@ -223,3 +244,8 @@ def _fault(sample: ImuSample) -> str | None:
     if max(map(abs, sample.rate_rad_s)) > LARGEST_RATE_RAD_S or max(map(abs, sample.force_m_s2)) > LARGEST_FORCE_M_S2:
         return "out_of_range"
     return None
+
+
+def _clipped(before: Vector3, now: Vector3) -> float:
+    """The largest turn rate in rad/s that stands at a limit, 0 if none does."""
+    return max(abs(b) if a == b and abs(b) >= SATURATION_RAD_S else 0.0 for a, b in zip(before, now, strict=True))

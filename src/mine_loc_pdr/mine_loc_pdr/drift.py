@@ -71,6 +71,11 @@ class DriftModel:
         self.covariance[BIAS, BIAS] += (gain * MEAN_RATE_SD_RAD_S) ** 2
         return gain
 
+    def saturation(self, angle_rad: float) -> None:
+        """A clipped turn rate: the body may have turned by so much more, always the same way."""
+        sd_rad = math.sqrt(self.covariance[HEADING, HEADING])
+        self.covariance[HEADING, HEADING] += angle_rad * (angle_rad + 2.0 * sd_rad)
+
     def gap(self, dt_s: float) -> None:
         """Nothing was measured for dt_s: the person may have walked and turned."""
         self.pass_time(dt_s)

@@ -1,8 +1,12 @@
 """Step detection on the vertical acceleration of the waist (paper B, section 2.2.1).
 
-A causal moving median smooths the signal; a step is an adjacent peak and valley, both past their thresholds, with
-exactly one zero crossing between them. A valley that reaches its threshold is past it whatever follows, so a step is
-reported at that sample already: 0.24 s after the heel strike in the median, which keeps a live position live.
+A causal moving median takes out spikes and two moving means the knocks of the heel; a step is an adjacent peak and
+valley, both past their thresholds, with exactly one zero crossing between them. The thresholds follow the person: they
+are shares of the peaks of the walk so far. A valley that reaches its threshold is past it whatever follows, so a step
+is reported at that sample already.
+
+The foot that is drawn up at a halt or in a turn on the spot makes a peak far below the others; one such weak peak is
+let through after a full step, when it comes in time.
 """
 
 import math
@@ -10,33 +14,57 @@ from bisect import bisect_left, insort
 from collections import deque
 from dataclasses import dataclass
 
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_s
+from mine_loc_core.stamps import NS_PER_MS, to_s
 
-# The window and thresholds are those of least error on people 1 to 7 of ipol_gait_lowerback; people 8 to 13 are kept
-# for scoring (test_dead_reckoning.py).
 MEDIAN_WINDOW_NS = 75 * NS_PER_MS
-PEAK_THRESHOLD_M_S2 = 0.4
-VALLEY_THRESHOLD_M_S2 = 0.2
-# Shifting one's weight while standing also makes a peak and a valley; most first peaks below this are no step.
-START_PEAK_THRESHOLD_M_S2 = 1.0
+MEAN_WINDOW_NS = 120 * NS_PER_MS
 SHORTEST_INTERVAL_NS = 300 * NS_PER_MS
-LONGEST_INTERVAL_NS = 2 * NS_PER_S  # what comes later starts a new walk
-_BASELINE_TIME_CONSTANT_S = 5.0
+LONGEST_INTERVAL_NS = 1500 * NS_PER_MS  # what comes later starts a new walk
+# The heel strikes this long after the smoothed acceleration rises through zero: median over ipol_gait_lowerback.
+STRIKE_AFTER_RISE_NS = 65 * NS_PER_MS
+# Half waves of the slowest walk; what takes longer is no step, and would be reported late.
+_LONGEST_PEAK_NS = 550 * NS_PER_MS
+_LONGEST_WAIT_NS = 200 * NS_PER_MS  # from the zero crossing to the valley's threshold
+_BASELINE_TIME_CONSTANT_S = 2.0
+_ADAPTATION = 0.3  # share of the newest step in what is held for usual
+_FIRST_INTERVAL_S = 0.55  # until a walk has shown its own
+
+
+@dataclass(frozen=True, slots=True)
+class StepThresholds:
+    """Of the smoothed vertical acceleration in m/s², chosen by leave-one-subject-out on ipol_gait_lowerback.
+
+    `python bench/pdr.py --only ipol` repeats the choice of the three that matter most: `start_peak_m_s2`, `peak_share`
+    and `weak_peak_m_s2`.
+    """
+
+    # Shifting one's weight while standing, and the push that begins a walk, also make a peak and a valley.
+    start_peak_m_s2: float = 1.0
+    peak_m_s2: float = 0.15
+    peak_share: float = 0.2  # of the usual peak of this walk
+    valley_m_s2: float = 0.05
+    weak_peak_m_s2: float = 0.08
+    weak_valley_m_s2: float = 0.01
+    weak_interval: tuple[float, float] = (0.6, 1.6)  # of the usual interval
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step: `stamp_ns` is the heel strike, `interval_s` the time since the step before, None after standing."""
+    """One step: `stamp_ns` is the heel strike, `interval_s` the time since the step before, None after standing.
+
+    `peak_m_s2` and `swing_m_s2` are of the smoothed vertical acceleration: its peak, and the way from the deepest
+    valley since the step before to this peak.
+    """
 
     stamp_ns: int
     interval_s: float | None
     peak_m_s2: float
+    swing_m_s2: float
 
     @property
     def confidence(self) -> float:
-        """Probability that this was a step: logistic in the peak, less for a first one; fitted on people 1 to 7."""
-        logit = 0.26 + 1.42 * self.peak_m_s2 - (2.97 if self.interval_s is None else 0.0)
-        return 1.0 / (1.0 + math.exp(-logit))
+        """Probability that this was a step: logistic in the peak, fitted on people 1 to 7 of ipol_gait_lowerback."""
+        return 1.0 / (1.0 + math.exp(0.7 - 2.8 * self.peak_m_s2))
 
 
 class MovingMedian:
@@ -57,41 +85,64 @@ class MovingMedian:
         return (samples[0][0] + stamp_ns) // 2, ordered[len(ordered) // 2]
 
 
+class MovingMean:
+    """Mean of the samples of the last `window_ns`."""
+
+    def __init__(self, window_ns: int) -> None:
+        self._window_ns = window_ns
+        self._samples: deque[tuple[int, float]] = deque()
+        self._sum = 0.0
+
+    def push(self, stamp_ns: int, value: float) -> tuple[int, float]:
+        """The middle instant of the window and the mean in it."""
+        samples = self._samples
+        samples.append((stamp_ns, value))
+        self._sum += value
+        while samples[0][0] <= stamp_ns - self._window_ns:
+            self._sum -= samples.popleft()[1]
+        return (samples[0][0] + stamp_ns) // 2, self._sum / len(samples)
+
+
 class StepDetector:
     """Takes the vertical acceleration sample by sample and reports steps as they are seen.
 
     Stamps must increase. An offset of the accelerometer is removed by a slow mean.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, thresholds: StepThresholds | None = None) -> None:
+        self._thresholds = thresholds or StepThresholds()
         self.reset()
 
     def reset(self) -> None:
         """Start afresh, after a gap in the data."""
-        self._median = MovingMedian(MEDIAN_WINDOW_NS)
+        self._filters = (MovingMedian(MEDIAN_WINDOW_NS), MovingMean(MEAN_WINDOW_NS), MovingMean(MEAN_WINDOW_NS))
         self._last_sample_ns: int | None = None
         self._baseline = 0.0
         self._positive = False
-        self._peak_m_s2 = 0.0
-        self._peak_ns = 0
+        self._peak_m_s2 = self._valley_m_s2 = 0.0
+        self._rise_ns = self._fall_ns = 0
         self._awaiting_valley = False
         self._last_step_ns: int | None = None
+        self._was_weak = False
+        self._usual_peak_m_s2 = 0.0
+        self._usual_interval_s = _FIRST_INTERVAL_S
 
     def push(self, stamp_ns: int, vertical_m_s2: float) -> Step | None:
         """Take one sample, upwards positive and without gravity; return the step it completes, if any."""
-        middle_ns, value = self._median.push(stamp_ns, self._without_offset(stamp_ns, vertical_m_s2))
+        middle_ns, value = stamp_ns, self._without_offset(stamp_ns, vertical_m_s2)
+        for smooth in self._filters:
+            middle_ns, value = smooth.push(middle_ns, value)
         if value > 0.0:
             if not self._positive:
-                self._positive, self._peak_m_s2 = True, 0.0
-            if value > self._peak_m_s2:
-                self._peak_m_s2, self._peak_ns = value, middle_ns
+                self._positive, self._peak_m_s2, self._rise_ns = True, 0.0, middle_ns
+            self._peak_m_s2 = max(self._peak_m_s2, value)
             return None
         if self._positive:
-            self._positive, self._awaiting_valley = False, self._peak_m_s2 >= PEAK_THRESHOLD_M_S2
-        if self._awaiting_valley and value <= -VALLEY_THRESHOLD_M_S2:
-            self._awaiting_valley = False
-            return self._step()
-        return None
+            self._positive, self._fall_ns = False, middle_ns
+            self._awaiting_valley = middle_ns - self._rise_ns <= _LONGEST_PEAK_NS
+        step = self._at_valley(middle_ns, value) if self._awaiting_valley else None
+        self._valley_m_s2 = min(self._valley_m_s2, value)
+        return step
 
     def _without_offset(self, stamp_ns: int, value: float) -> float:
         if self._last_sample_ns is not None:
@@ -100,15 +151,36 @@ class StepDetector:
         self._last_sample_ns = stamp_ns
         return value - self._baseline
 
-    def _step(self) -> Step | None:
-        last_ns = self._last_step_ns
-        if last_ns is None or self._peak_ns - last_ns > LONGEST_INTERVAL_NS:
-            if self._peak_m_s2 < START_PEAK_THRESHOLD_M_S2:
-                return None
-            interval_s = None
-        elif self._peak_ns - last_ns < SHORTEST_INTERVAL_NS:
+    def _at_valley(self, middle_ns: int, value: float) -> Step | None:
+        least = self._thresholds
+        strong = self._peak_m_s2 >= max(least.peak_m_s2, least.peak_share * self._usual_peak_m_s2)
+        if value > -(least.valley_m_s2 if strong else least.weak_valley_m_s2):
+            self._awaiting_valley = middle_ns - self._fall_ns <= _LONGEST_WAIT_NS
             return None
-        else:
-            interval_s = to_s(self._peak_ns - last_ns)
-        self._last_step_ns = self._peak_ns
-        return Step(self._peak_ns, interval_s, self._peak_m_s2)
+        self._awaiting_valley = False
+        stamp_ns, last_ns = self._rise_ns + STRIKE_AFTER_RISE_NS, self._last_step_ns
+        if last_ns is None or stamp_ns - last_ns > LONGEST_INTERVAL_NS:
+            return self._first(stamp_ns) if self._peak_m_s2 >= least.start_peak_m_s2 else None
+        interval_s = to_s(stamp_ns - last_ns)
+        if stamp_ns - last_ns < SHORTEST_INTERVAL_NS or not (strong or self._drawn_up(interval_s)):
+            return None
+        self._was_weak = not strong
+        if strong:
+            self._usual_peak_m_s2 += _ADAPTATION * (self._peak_m_s2 - self._usual_peak_m_s2)
+            self._usual_interval_s += _ADAPTATION * (interval_s - self._usual_interval_s)
+        return self._step(stamp_ns, interval_s)
+
+    def _drawn_up(self, interval_s: float) -> bool:
+        """Whether a weak peak, so long after a step, may be the other foot drawn up to it."""
+        shortest, longest = self._thresholds.weak_interval
+        in_time = shortest <= interval_s / self._usual_interval_s <= longest
+        return in_time and not self._was_weak and self._peak_m_s2 >= self._thresholds.weak_peak_m_s2
+
+    def _first(self, stamp_ns: int) -> Step:
+        self._was_weak, self._usual_peak_m_s2, self._usual_interval_s = False, self._peak_m_s2, _FIRST_INTERVAL_S
+        return self._step(stamp_ns, None)
+
+    def _step(self, stamp_ns: int, interval_s: float | None) -> Step:
+        self._last_step_ns = stamp_ns
+        swing_m_s2, self._valley_m_s2 = self._peak_m_s2 - self._valley_m_s2, 0.0
+        return Step(stamp_ns, interval_s, self._peak_m_s2, swing_m_s2)

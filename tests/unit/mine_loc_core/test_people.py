@@ -39,8 +39,28 @@ def test_an_n100_and_a_stride_take_their_defaults(tmp_path):
     ann, bob = load_people(written(tmp_path, HEAD + ANN + BOB))
     assert ann.n100 == N100("/dev/n100", 921_600, (0, math.pi / 2, 0))
     assert bob.n100 is None
-    assert bob.stride == Stride(1, 0.371, 0.227)
+    assert bob.stride == Stride(1, 0.371, 0.227, "pendulum")
     assert bob.tag_height_m is None
+
+
+@pytest.mark.parametrize(
+    ("stride", "model"),
+    [
+        ("{k: 0.9}", "pendulum"),
+        ("{alpha: 0.3}", "paper_b"),
+        ("{k: 1.1, beta: 0.2}", "paper_b"),
+        ("{model: pendulum, alpha: 0.3}", "pendulum"),
+        ("{model: paper_b}", "paper_b"),
+    ],
+)
+def test_coefficients_of_paper_b_choose_its_model_where_none_is_named(tmp_path, stride, model):
+    (person,) = load_people(written(tmp_path, HEAD + f"  - {{name: eve, height_m: 1.7, stride: {stride}}}\n"))
+    assert person.stride.model == model
+
+
+def test_an_unknown_step_length_model_is_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match="model"):
+        load_people(written(tmp_path, HEAD + "  - {name: eve, height_m: 1.7, stride: {model: weinberg}}\n"))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMedian, Step, StepDetector
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMean, MovingMedian, Step, StepDetector
 
 
 def detect(values, rate_hz=100, detector=None, start_ns=10**18):
@@ -33,11 +33,11 @@ def test_every_cycle_is_one_step_at_any_sample_rate(step_hz, rate_hz):
     assert all(s.interval_s == pytest.approx(1 / step_hz, abs=0.03) for _, s in steps[3:])
 
 
-def test_a_step_is_stamped_at_its_peak_and_reported_within_four_tenths_of_a_second():
+def test_a_step_is_stamped_at_its_strike_after_the_rise_and_reported_within_four_tenths_of_a_second():
     steps = detect(walk(20, 1.8))
     for reported_ns, step in steps:
         phase = ((step.stamp_ns - 10**18) / NS_PER_S * 1.8) % 1.0
-        assert phase == pytest.approx(0.25, abs=0.05)
+        assert phase == pytest.approx(0.065 * 1.8, abs=0.02)
         assert reported_ns - step.stamp_ns < 400 * NS_PER_MS
 
 
@@ -57,8 +57,9 @@ def test_in_a_walk_weaker_peaks_count_than_at_its_start():
 
 
 def test_two_zero_crossings_between_peak_and_valley_are_no_step():
-    up, valley = np.full(20, 2.0), np.full(20, -2.0)
-    wiggle = np.concatenate((np.full(12, -0.1), np.full(12, 0.1)))
+    valley = np.full(20, -2.0)
+    up = np.concatenate((valley, -valley))
+    wiggle = np.concatenate((np.full(30, -0.02), np.full(30, 0.02)))
     assert len(detect(np.concatenate((up, valley)))) == 1
     assert detect(np.concatenate((up, wiggle, valley))) == []
 
@@ -80,6 +81,33 @@ def test_an_accelerometer_offset_goes_away():
     assert len(detect(walk(60, 1.8, amplitude=1.2) + 1.0)) == pytest.approx(108, abs=8)
 
 
+def test_one_weak_peak_after_a_walk_is_the_foot_drawn_up_a_second_is_none():
+    sway = walk(0.56, 1.8, amplitude=0.2)
+    still = np.zeros(100)
+    halt = [s for _, s in detect(np.concatenate((walk(4, 2.0), sway, still)))]
+    assert len(halt) == 9
+    swaying = [s for _, s in detect(np.concatenate((walk(4, 2.0), sway, sway, sway, sway, still)))]
+    assert len(swaying) == 9
+
+
+def test_thresholds_follow_the_person():
+    for strong in (1.5, 6.0):
+        steps = detect(np.concatenate((walk(4, 2.0, amplitude=strong), walk(4, 2.0, amplitude=0.5 * strong))))
+        assert len(steps) == 16
+    shuffling = detect(np.concatenate((walk(4, 2.0, amplitude=6.0), walk(6, 2.0, amplitude=0.5), np.zeros(100))))
+    assert len(shuffling) <= 10
+
+
+def test_the_swing_is_the_way_from_valley_to_peak():
+    steps = [s for _, s in detect(walk(20, 1.8, amplitude=2.5))]
+    gain = np.sinc(1.8 * 0.12) ** 2
+    assert all(s.swing_m_s2 == pytest.approx(2 * 2.5 * gain, rel=0.05) for s in steps[6:])
+
+
+def test_a_long_lift_is_no_step():
+    assert detect(np.concatenate((np.zeros(100), np.full(80, 2.0), np.full(80, -2.0), np.zeros(100)))) == []
+
+
 def test_reset_forgets_the_walk():
     detector = StepDetector()
     detect(walk(3), detector=detector)
@@ -87,10 +115,9 @@ def test_reset_forgets_the_walk():
     assert detect(walk(3), detector=detector, start_ns=2 * 10**18)[0][1].interval_s is None
 
 
-def test_confidence_is_a_probability_that_grows_with_the_peak_and_in_a_walk():
-    weak, strong = Step(0, 0.5, 0.5), Step(0, 0.5, 3.0)
+def test_confidence_is_a_probability_that_grows_with_the_peak():
+    weak, strong = Step(0, 0.5, 0.5, 1.0), Step(0, 0.5, 3.0, 6.0)
     assert 0.5 < weak.confidence < strong.confidence < 1.0
-    assert Step(0, None, 1.5).confidence < Step(0, 0.5, 1.5).confidence
 
 
 @given(st.lists(st.floats(-50, 50), min_size=1, max_size=200), st.integers(2, 30))
@@ -100,6 +127,16 @@ def test_the_moving_median_is_the_median_of_the_window(values, window):
         middle_ns, result = median.push(k * 10, value)
         inside = values[max(0, k - window + 1) : k + 1]
         assert result == statistics.median_high(inside)
+        assert middle_ns == (max(0, k - window + 1) * 10 + k * 10) // 2
+
+
+@given(st.lists(st.floats(-50, 50), min_size=1, max_size=200), st.integers(2, 30))
+def test_the_moving_mean_is_the_mean_of_the_window(values, window):
+    mean = MovingMean(window * 10)
+    for k, value in enumerate(values):
+        middle_ns, result = mean.push(k * 10, value)
+        inside = values[max(0, k - window + 1) : k + 1]
+        assert result == pytest.approx(statistics.fmean(inside), abs=1e-9)
         assert middle_ns == (max(0, k - window + 1) * 10 + k * 10) // 2
 
 

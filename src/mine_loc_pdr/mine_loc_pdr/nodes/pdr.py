@@ -24,7 +24,7 @@ from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_pdr.dead_reckoning import ImuSample, OdometryPose, PedestrianDeadReckoning, StepEvent
 from mine_loc_pdr.parameters import PdrParameters
-from mine_loc_pdr.stride import StrideModel
+from mine_loc_pdr.stride import stride_model
 
 _PEOPLE_PERIOD_S = 1.0
 _SILENT_S = 1.0
@@ -45,11 +45,9 @@ class Track:
 
     def restart(self) -> None:
         """Begin at the origin of odom."""
-        stride = self.person.stride
-        model = StrideModel(self.person.height_m, stride.alpha, stride.beta, stride.k)
         mounting = quaternion.from_euler_zyx(*self._n100.mounting_rpy_rad)
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
-        self.pdr = PedestrianDeadReckoning(model, (float(x), float(y), float(z)))
+        self.pdr = PedestrianDeadReckoning(stride_model(self.person), (float(x), float(y), float(z)))
         self.published_period = 0
         self.samples = 0
 

@@ -1,0 +1,100 @@
+"""Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
+
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap]
+
+Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); docs/pdr.md
+explains the rows.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core: before numpy is loaded
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+import pdr_distance
+import pdr_heading
+import pdr_recordings
+import pdr_steps
+from pdr_tracks import track
+from rich.console import Console
+from rich.table import Column, Table
+
+RESULTS = Path(__file__).parent / "results" / "pdr.json"
+
+
+def ipol() -> dict[str, Any]:
+    """Thirteen people, 10 m out, U-turn, 10 m back."""
+    recordings = list(pdr_recordings.ipol())
+    tracks = [track(recording) for recording in recordings]
+    distance, stretch = pdr_distance.ipol(recordings)
+    heading = pdr_heading.ipol(recordings, tracks, stretch)
+    return {"steps": pdr_steps.ipol(recordings, tracks), "heading": heading, "distance": distance}
+
+
+def oxford() -> dict[str, Any]:
+    """Phones in hands, pockets and pouches."""
+    return {"steps": pdr_steps.oxford(list(pdr_recordings.oxford()))}
+
+
+def mobgap() -> dict[str, Any]:
+    """Short walks and a simulation of daily activities."""
+    recordings = list(pdr_recordings.mobgap())
+    tracks = [track(recording) for recording in recordings]
+    return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
+
+
+PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {"ipol": ipol, "oxford": oxford, "mobgap": mobgap}
+
+
+def table(figures: Mapping[str, Any]) -> Table:
+    """Every leaf that a reader compares with a target; the file has all."""
+    shown = Table(Column("figure", overflow="fold"), "value", title="dead reckoning")
+    for path, value in _leaves(figures, ""):
+        shown.add_row(path, value)
+    return shown
+
+
+def _leaves(node: Mapping[str, Any], path: str) -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    for name, value in node.items():
+        here = f"{path}.{name}".lstrip(".")
+        if isinstance(value, dict) and "mean" in value:
+            rows.append((here, f"{value['mean']} ± {value['sd']} (max {value['max']})"))
+        elif isinstance(value, dict):
+            rows += _leaves(value, here)
+        else:
+            rows.append((here, str(value)))
+    return rows
+
+
+def main() -> int:
+    """Run the chosen parts and write them beside those already in the file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, default=RESULTS, help="file to write into")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts to run (default all)")
+    arguments = parser.parse_args()
+    console = Console()
+    if not os.environ.get("MINE_LOC_DATA"):
+        console.print("left out: MINE_LOC_DATA is not set")
+        return 0
+    path: Path = arguments.json
+    figures: dict[str, Any] = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    for part in arguments.only:
+        with console.status(part):
+            figures[part] = PARTS[part]()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(figures, indent=2, sort_keys=True) + "\n", "utf-8")
+    console.print(table(figures))
+    console.print(f"written: {path}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

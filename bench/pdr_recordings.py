@@ -1,0 +1,114 @@
+"""The recordings that dead reckoning is scored on, as samples in the order and at the times a device sent them."""
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gait_recordings import RATE_HZ, Array
+from scipy.io import loadmat
+
+from mine_loc_core.stamps import NS_PER_S, to_ns
+
+START_NS = 10**15
+STANDARD_GRAVITY_M_S2 = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Samples of one trial and its truth; times in s from START_NS."""
+
+    name: str
+    person: str
+    stamps_ns: np.ndarray  # (n,)
+    rate_rad_s: Array  # (n, 3), forward-left-up
+    force_m_s2: Array  # (n, 3)
+    strikes_s: Array  # marked heel strikes
+    height_m: float | None = None
+    bouts: list[tuple[float, float, float]] = field(default_factory=list)  # begin, end, metres walked, of the reference
+    active: list[tuple[float, float]] = field(default_factory=list)  # when any reference saw walking
+    turn: tuple[float, float] | None = None
+    counted: int | None = None  # by a device beside, where strikes are not marked
+
+
+def folder(name: str) -> Path:
+    """Of a public data set."""
+    return Path(os.environ["MINE_LOC_DATA"]) / name
+
+
+def ipol() -> Iterator[Recording]:
+    """The rows as they came: packets lost stay lost, stamps are packet counters. Sensor X is up, Z backwards.
+
+    The trial lies between its marked boundaries: after the end people go back as they like, and of those steps only
+    some are marked.
+    """
+    data = folder("ipol_gait_lowerback") / "GaitData"
+    for path in sorted(data.glob("*.json"), key=lambda p: [int(part) for part in p.stem.split("-")]):
+        truth = json.loads(path.read_text())
+        table = np.loadtxt(data / f"{path.stem}_lb.txt.gz", skiprows=2)
+        table = table[np.unique(table[:, 0], return_index=True)[1]]
+        flu = np.array([-1.0, 1.0, 1.0])
+        marks = sorted(end for _, end in truth["LeftFootEvents"] + truth["RightFootEvents"])
+        begin, end = np.array(truth["TrialBoundaries"]) / RATE_HZ
+        yield Recording(
+            path.stem,
+            str(truth["Subject"]),
+            START_NS + (table[:, 0] * NS_PER_S / RATE_HZ).astype(np.int64),
+            table[:, [6, 5, 4]] * flu,
+            table[:, [3, 2, 1]] * flu,
+            np.array(marks) / RATE_HZ,
+            None if np.isnan(float(truth["Height"])) else float(truth["Height"]) / 100,
+            [(begin, end, 20.0)],
+            turn=(truth["UTurnBoundaries"][0] / RATE_HZ, truth["UTurnBoundaries"][1] / RATE_HZ),
+        )
+
+
+def oxford() -> Iterator[Recording]:
+    """Phones, no gyro: the rate is nought, so that gravity alone tells the vertical."""
+    for path in sorted((folder("oxford_step_counter") / "validation").glob("*.csv.gz")):
+        table = np.loadtxt(path, delimiter=",")
+        name = path.name.rsplit("_", 1)[0]
+        yield Recording(
+            name,
+            name.split("_")[0],
+            START_NS + (table[:, 0] - table[0, 0]).astype(np.int64),
+            np.zeros((len(table), 3)),
+            table[:, 1:4],
+            np.empty(0),
+            counted=int(table[-1, 5] - table[0, 5]),
+        )
+
+
+def mobgap() -> Iterator[Recording]:
+    """The trials for which a reference saw walking: INDIP's insoles, and motion capture where these saw none.
+
+    Sensor X is up, Z forward. The people's heights are not given.
+    """
+    for path in sorted(folder("mobgap_lowerback").glob("example_data/data/lab/*/*/data.mat")):
+        person = f"{path.parts[-3]}/{path.parts[-2]}"
+        for test, trials in loadmat(path, simplify_cells=True)["data"]["TimeMeasure1"].items():
+            for trial, content in trials.items() if isinstance(trials, dict) else ():
+                references = {name: _bouts(content["Standards"][name]) for name in ("INDIP", "Stereophoto")}
+                bouts = references["INDIP"] or references["Stereophoto"]
+                if not bouts:
+                    continue
+                sensor = content["SU"]["LowerBack"]
+                strikes = sorted(t for bout in bouts for t in np.atleast_1d(bout["InitialContact_Event"]))
+                yield Recording(
+                    f"{person} {test} {trial}",
+                    person,
+                    START_NS + np.arange(len(sensor["Acc"])) * to_ns(1.0 / RATE_HZ),
+                    np.radians(sensor["Gyr"])[:, [2, 1, 0]] * np.array([1.0, -1.0, 1.0]),
+                    sensor["Acc"][:, [2, 1, 0]] * np.array([1.0, -1.0, 1.0]) * STANDARD_GRAVITY_M_S2,
+                    np.array([t for t in strikes if np.isfinite(t)]),
+                    bouts=[(float(b["Start"]), float(b["End"]), float(b["Length"])) for b in bouts],
+                    active=[(float(b["Start"]), float(b["End"])) for each in references.values() for b in each],
+                )
+
+
+def _bouts(standard: dict[str, Any]) -> list[dict[str, Any]]:
+    found = standard["MicroWB"]
+    return [bout for bout in (found if isinstance(found, list | np.ndarray) else [found]) if isinstance(bout, dict)]
