@@ -12,9 +12,10 @@ import yaml
 from graph.domains import lent_domain
 from graph.observer import Heard, Observer
 from graph.processes import Running, node_command, running
-from graph.walker import ANCHORS, TAG_HEIGHT_M, write_site
+from graph.walker import ANCHORS, TAG_HEIGHT_M, person, write_site
 from mine_loc_interfaces.msg import (
     AnchorMap,
+    Epoch,
     LinkState,
     MeasurementVerdict,
     MeasurementVerdictArray,
@@ -237,3 +238,20 @@ def test_a_frame_that_the_site_does_not_have_is_refused_with_those_it_has(mixed_
         (line,) = run.output.splitlines()
     assert "frame: 'loader'" in line
     assert "allowed: map, shuttle" in line
+
+
+def test_positions_in_a_vehicle_s_frame_are_no_epochs_of_the_map(tmp_path, domain, observer):
+    """Where a tag is beside a vehicle says nothing of where it is in the mine: nobody tells where the vehicle is."""
+    site = write_site(tmp_path / "site", [], [person("walker", 17)])
+    epochs = observer.listen(Epoch, "sync/epochs")
+    poses = observer.node.create_publisher(UwbPose, "uwb/pose", 10)
+    with running(node_command("mine_loc_fusion.nodes.synchroniser", {"site": site}), domain, tmp_path / "log"):
+        observer.wait_for(poses.get_subscription_count, what="the node")
+        observer.wait_for(lambda: observer.level("synchroniser: callbacks") == 0, what="an active node")
+        for seq, frame in enumerate(("loader/base_link", "map"), start=1):
+            pose = UwbPose(tag_id=17, seq=seq, status=UwbPose.OK)
+            pose.header.stamp, pose.header.frame_id = to_time(time.time_ns()), frame
+            poses.publish(pose)
+        observer.wait_for(lambda: len(epochs), what="an epoch")
+        observer.wait_for(lambda: observer.value("synchroniser: frames", "poses") == 1, what="the counter")
+    assert [pose.seq for epoch in epochs.messages for pose in epoch.uwb_poses] == [2]

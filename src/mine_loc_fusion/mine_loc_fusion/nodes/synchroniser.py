@@ -37,13 +37,14 @@ class SynchroniserNode(NodeBase):
         self._people = PeopleFile(folder)
         self._synchroniser = self._new_synchroniser()
         self._unknown_tags: dict[int, int] = {}
+        self._in_other_frames = 0
         self._refused_before: dict[str, int] = {}
         self._epochs = self.publish_to(msg.Epoch, "sync/epochs", EVENTS)
         self.every(_POLL_PERIOD_S, self._poll)
         self.every(_PEOPLE_PERIOD_S, self._reload_people)
         self.subscribe(msg.UwbRangeArray, "uwb/ranges", self._on_ranges, EVENTS)
         self.subscribe(msg.TdoaArray, "uwb/tdoa", lambda m: self._on_tag(Kind.TDOA, m, m.seq), EVENTS)
-        self.subscribe(msg.UwbPose, "uwb/pose", lambda m: self._on_tag(Kind.UWB_POSE, m, m.seq), EVENTS)
+        self.subscribe(msg.UwbPose, "uwb/pose", self._on_pose, EVENTS)
         self.subscribe(
             msg.LinkState,
             "uwb/link_state",
@@ -70,6 +71,9 @@ class SynchroniserNode(NodeBase):
         yield Health("inputs", level, "aligning", {"used": synchroniser.used, "late": synchroniser.late} | refused)
         if self._unknown_tags:
             yield Health("tags", Level.WARN, "tags that nobody in people.yaml wears", self._unknown_tags)
+        if self._in_other_frames:
+            figures = {"poses": self._in_other_frames}
+            yield Health("frames", Level.OK, f"positions that are not in {self._map_frame} are left out", figures)
         if self._people.error:
             yield Health("people.yaml", Level.WARN, self._people.error)
 
@@ -92,6 +96,12 @@ class SynchroniserNode(NodeBase):
 
     def _on_ranges(self, message: msg.UwbRangeArray) -> None:
         self._on_tag(Kind.RANGES, message, message.seq, message.reporter_id, links=links_received(message))
+
+    def _on_pose(self, message: msg.UwbPose) -> None:
+        if message.header.frame_id == self._map_frame:
+            self._on_tag(Kind.UWB_POSE, message, message.seq)
+        else:  # of anchors that ride on a vehicle
+            self._in_other_frames += 1
 
     def _on_tag(self, kind: Kind, message: Any, seq: int, source: Hashable = 0, links: int = 0) -> None:
         person = self._people.people.by_tag(message.tag_id)
