@@ -1,5 +1,6 @@
 """A site folder for a run on other lines than the site's own: a shipped one with its ports and people replaced."""
 
+import dataclasses
 import math
 import shutil
 from collections.abc import Mapping, Sequence
@@ -34,9 +35,8 @@ def write_site_folder(
 
 
 def _item(person: Person) -> dict[str, Any]:
-    stride = person.stride
     item: dict[str, Any] = {"name": person.name, "tag_id": person.tag_id, "height_m": person.height_m}
-    item["stride"] = {"k": stride.k, "alpha": stride.alpha, "beta": stride.beta}
+    item["stride"] = dataclasses.asdict(person.stride)
     if person.tag_height_m is not None:
         item["tag_height_m"] = person.tag_height_m
     if person.n100 is not None:

@@ -29,7 +29,7 @@ def test_only_the_ports_differ_from_the_shipped_folder(tmp_path):
 def test_people_are_written_as_they_are(tmp_path):
     worn = N100("/dev/x", 115200, (0.0, math.pi / 2, 0.0))
     people = (
-        Person("one", 2**40, 1.81, worn, Stride(1.1, 0.3, 0.2), 1.2),
+        Person("one", 2**40, 1.81, worn, Stride(1.1, 0.3, 0.2, "paper_b"), 1.2),
         Person("two", 0, 1.6, None, Stride(), None),
     )
     write_site_folder(SOURCE, tmp_path / "site", {"rtls": "/dev/y", "one/n100": "/dev/x"}, people)
