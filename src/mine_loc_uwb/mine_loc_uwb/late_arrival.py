@@ -92,7 +92,7 @@ def _without_offset(
                 first, second = late_m[k, i], first
             elif late_m[k, i] < second:
                 second = late_m[k, i]
-        second = second if count > 2 else first
+        second = second if count > 1 else first
         low = max(first - before_m, second - reach_m - before_m)
         total, scale = 0.0, -np.inf
         for step in range(int((second + after_m - low) / stride_m) + 1):
