@@ -28,6 +28,7 @@ check_prerequisites() {
     [ "$(uname -sm)" = "Linux x86_64" ] || { echo "setup: the ROS wheels exist for Linux x86_64 only; elsewhere use a full ROS 2 Jazzy (docs/hardware.md)" >&2; exit 1; }
     command -v g++ > /dev/null || missing "a C++ compiler" g++
     command -v make > /dev/null || missing make make
+    command -v setpriv > /dev/null || missing setpriv util-linux
     "$1" -c 'import ensurepip, venv' 2>/dev/null || missing "the venv module of $1" python3-venv
     [ -f "$("$1" -c 'import sysconfig; print(sysconfig.get_path("include"))')/Python.h" ] || missing "Python.h" python3-dev
 }

@@ -5,8 +5,9 @@ docs/architecture.md says why this is not circus, supervisor or honcho.
 
 import asyncio
 import contextlib
-import ctypes
+import errno
 import os
+import shutil
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
@@ -19,8 +20,9 @@ HEALTHY_S = 30.0  # a process that ran this long starts its back-off afresh
 PATIENCE_S = 1.5  # between SIGTERM and SIGKILL
 _LAST_WORDS_S = 0.2  # for output still in the pipe; longer only if somebody left the group and holds it open
 _LONGEST_LINE = 1 << 16
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
-_LIBC = ctypes.CDLL(None)
+# The kernel kills the child when its parent dies, however it dies. Asked for by setpriv and not in a preexec_fn, for
+# which Python would fork: a fork runs the handlers of OpenBLAS, which wait for ever for a product in another thread.
+_DIE_WITH_PARENT = ("setpriv", "--pdeathsig", "KILL", "--")
 
 
 class EventKind(Enum):
@@ -156,16 +158,18 @@ class Supervisor:
 
         The pipe is not asyncio's own, because asyncio may not report an exit while somebody holds the pipe open.
         """
+        if shutil.which(command[0], path=self._environment.get("PATH")) is None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         read_end, write_end = os.pipe()
         try:
             process = await asyncio.create_subprocess_exec(
+                *_DIE_WITH_PARENT,
                 *command,
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=write_end,
                 stderr=write_end,
                 env=self._environment,
                 start_new_session=True,
-                preexec_fn=_die_with(os.getpid()),
             )
         except OSError:
             os.close(read_end)
@@ -193,14 +197,3 @@ class Supervisor:
 def _signal_group(pid: int, number: signal.Signals) -> None:
     with contextlib.suppress(ProcessLookupError):
         os.killpg(pid, number)
-
-
-def _die_with(parent: int) -> Callable[[], None]:
-    """Make the kernel kill the child when its parent dies, however it dies (prctl(2), PR_SET_PDEATHSIG)."""
-
-    def prepare() -> None:
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:  # it died before the call above
-            os._exit(1)
-
-    return prepare

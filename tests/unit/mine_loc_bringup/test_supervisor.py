@@ -276,3 +276,32 @@ asyncio.run(main())
         parent.send_signal(number)
         parent.wait(DEADLINE_S)
     assert ends(child)
+
+
+def test_processes_start_while_another_thread_multiplies_matrices():
+    """As in the demo, where the simulator computes beside the supervisor. OpenBLAS's handler of fork() would hang."""
+    script = f"""
+import asyncio, threading
+import numpy as np
+from mine_loc_bringup.supervisor import Supervisor
+
+stop = threading.Event()
+
+def multiply():
+    a = np.ones((400, 400))
+    while not stop.is_set():
+        a @ a
+
+async def main():
+    told = asyncio.Semaphore(0)
+    supervisor = Supervisor({{}}, lambda event: None, lambda name, text: told.release())
+    await supervisor.set_commands({{str(i): {python(OBEDIENT)!r} for i in range(10)}})
+    for _ in range(10):
+        await told.acquire()
+    await supervisor.stop()
+
+threading.Thread(target=multiply, daemon=True).start()
+asyncio.run(main())
+stop.set()
+"""
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=DEADLINE_S)
