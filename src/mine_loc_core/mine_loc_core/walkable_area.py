@@ -1,0 +1,81 @@
+"""Where people can be: the galleries and chambers of a site, on the ground plan."""
+
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from mine_loc_core.site import Chamber, Gallery, Site
+
+Array = npt.NDArray[np.float64]
+
+
+class WalkableArea:
+    """Ground plan of galleries and chambers in the map [m].
+
+    A gallery is a strip of its width along the centre line. Strips overlap by half a width where a line bends, so that
+    corners are walkable, and end flat at the line's ends.
+    """
+
+    def __init__(self, galleries: Iterable[Gallery], chambers: Iterable[Chamber] = ()) -> None:
+        legs = [leg for gallery in galleries for leg in _legs(gallery)]
+        self.legs = np.array(legs).reshape(-1, 7)
+        """(n, 7): start x, y, unit vector x, y, extent along it from, to, half width."""
+        self.polygons = tuple(np.array(chamber.polygon_m, dtype=float) for chamber in chambers)
+
+    @classmethod
+    def of(cls, site: Site) -> "WalkableArea | None":
+        """The area of a site; None where the site file says nothing of galleries and chambers."""
+        return cls(site.galleries, site.chambers) if site.galleries or site.chambers else None
+
+    def outside_m(self, points_m: Array) -> Array:
+        """Distance of `points_m` (n, 2) from the area, (n,); 0 inside."""
+        distance_m: Array = np.linalg.norm(points_m - self.nearest(points_m), axis=1)
+        return distance_m
+
+    def nearest(self, points_m: Array) -> Array:
+        """The point of the area nearest to each of `points_m` (n, 2); a point inside is its own."""
+        candidates = [*_nearest_in_legs(self.legs, points_m), *(_nearest_in(p, points_m) for p in self.polygons)]
+        stacked = np.stack(candidates)
+        best = np.argmin(np.sum((stacked - points_m) ** 2, axis=2), axis=0)
+        found: Array = stacked[best, np.arange(len(points_m))]
+        return found
+
+
+def _legs(gallery: Gallery) -> Iterable[tuple[float, ...]]:
+    line = np.array(gallery.centre_line_m, dtype=float)[:, :2]
+    half = gallery.width_m / 2.0
+    last = len(line) - 2
+    for number, (start, end) in enumerate(pairwise(line)):
+        length = float(np.hypot(*(end - start)))
+        if length > 0.0:
+            along = (end - start) / length
+            yield (*start, *along, -half * (number > 0), length + half * (number < last), half)
+
+
+def _nearest_in_legs(legs: Array, points_m: Array) -> Array:
+    """(legs, n, 2)."""
+    offset = points_m - legs[:, None, :2]
+    along, across = legs[:, None, 2:4], np.stack([-legs[:, 3], legs[:, 2]], axis=1)[:, None]
+    s = np.clip(np.sum(offset * along, axis=2), legs[:, None, 4], legs[:, None, 5])
+    t = np.clip(np.sum(offset * across, axis=2), -legs[:, None, 6], legs[:, None, 6])
+    nearest: Array = legs[:, None, :2] + s[..., None] * along + t[..., None] * across
+    return nearest
+
+
+def _nearest_in(polygon: Array, points_m: Array) -> Array:
+    """(n, 2); inside by the even-odd rule."""
+    start, edge = polygon, np.roll(polygon, -1, axis=0) - polygon
+    offset = points_m[:, None] - start
+    share = np.clip(np.sum(offset * edge, axis=2) / np.maximum(np.sum(edge**2, axis=1), 1e-300), 0.0, 1.0)
+    feet = start + share[..., None] * edge
+    best = np.argmin(np.sum((feet - points_m[:, None]) ** 2, axis=2), axis=1)
+    x, y = points_m[:, :1], points_m[:, 1:]
+    (x0, y0), (x1, y1) = start.T, np.roll(polygon, -1, axis=0).T
+    straddles = (y0 > y) != (y1 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+    inside = np.sum(straddles & left, axis=1) % 2 == 1
+    nearest: Array = np.where(inside[:, None], points_m, feet[np.arange(len(points_m)), best])
+    return nearest
