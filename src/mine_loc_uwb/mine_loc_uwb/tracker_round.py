@@ -22,7 +22,6 @@ from mine_loc_uwb.tracker_kernel import (
     TOP_SPEED,
     Integers,
     open_offset,
-    predict,
     take_level,
     take_range,
 )
@@ -43,6 +42,7 @@ def take_round(
     x: Array,
     P: Array,
     dimensions: int,
+    first_link: int,
     anchors_m: Array,
     slots: Integers,
     range_m: Array,
@@ -61,7 +61,7 @@ def take_round(
     quality: Array,
     claimed_m2: Array,
 ) -> None:
-    """Predict by `gone_s` and take all ranges of a round.
+    """Take all ranges of a round, `gone_s` after the last one, into a state predicted to it.
 
     What fits best is taken first, so that it decides what becomes of the rest. `link_nlos` (L,) is how far each link is
     believed to be obstructed by its own ranges; belief fades to the share of links that are. A judgement of the link
@@ -71,7 +71,6 @@ def take_round(
     the round was, in `claimed_m2` (3, 3), zeros before, the covariance to claim.
     """
     work = np.empty((3, len(x)))
-    predict(x, P, dimensions, gone_s, noise)
     x_before, P_before, nlos_before = x.copy(), P.copy(), link_nlos.copy()
     fresh = min(gone_s / noise[NLOS_TIME], 1.0)
     memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
@@ -85,17 +84,18 @@ def take_round(
         belief = _shifted(link_nlos[slot], los_probability[first])
         codes[first], deviances[first] = ACCEPTED, 0.0
         open_offset(
-            x, P, dimensions, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first], height_m,
-            belief, _scale_m(level_dbm[first], noise), work,
+            x, P, dimensions, first_link, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first],
+            height_m, belief, _scale_m(level_dbm[first], noise), work,
         )  # fmt: skip
     for _ in range(todo.sum()):
-        number = _most_credible(x, dimensions, anchors_m, slots, range_m, height_m, todo, work)
+        number = _most_credible(x, dimensions, first_link, anchors_m, slots, range_m, height_m, todo, work)
         todo[number] = False
         slot = slots[number]
         belief = _shifted(link_nlos[slot], los_probability[number])
         codes[number], deviances[number], nlos = take_range(
-            x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
-            height_m, belief, _scale_m(level_dbm[number], noise), fresh, gone_s * noise[TOP_SPEED], gate, work,
+            x, P, dimensions, first_link, anchors_m[number], slot, range_m[number], variance_m2[number],
+            since_s[number], height_m, belief, _scale_m(level_dbm[number], noise), fresh,
+            gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
         link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number])  # the judgement taken out again
     if noise[LEVEL_SD] > 0.0:
@@ -105,7 +105,7 @@ def take_round(
     if len(codes) >= _CONTEST and 2 * np.sum(codes == ACCEPTED) < len(codes):
         x[:], P[:], link_nlos[:] = x_before, P_before, nlos_before
         codes[codes == ACCEPTED] = CONTESTED
-    judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, deviances, quality)
+    judge_round(x, dimensions, first_link, anchors_m, slots, range_m, since_s, height_m, codes, deviances, quality)
     claim(x, P, dimensions, anchors_m, height_m, codes, noise, claimed_m2)
 
 
@@ -113,6 +113,7 @@ def take_round(
 def judge_round(
     x: Array,
     dimensions: int,
+    first_link: int,
     anchors_m: Array,
     slots: Integers,
     range_m: Array,
@@ -133,7 +134,7 @@ def judge_round(
         for axis in range(d):
             at[axis] = x[axis] + since_s[number] * x[d + axis]
         distance = direction(at, anchors_m[number], height_m, unit)
-        squares += (range_m[number] - distance - x[2 * d] - x[2 * d + 1 + slots[number]]) ** 2
+        squares += (range_m[number] - distance - x[2 * d] - x[first_link + slots[number]]) ** 2
         used[number] = 1.0
         quality[HOLDING] += deviances[number] < _HOLDING_DEVIANCE
     quality[USED] = used.sum()
@@ -201,6 +202,7 @@ def _shifted(belief: float, los_probability: float) -> float:
 def _most_credible(
     x: Array,
     dimensions: int,
+    first_link: int,
     anchors_m: Array,
     slots: Integers,
     range_m: Array,
@@ -213,7 +215,7 @@ def _most_credible(
     for number in range(len(range_m)):
         if todo[number]:
             distance = direction(x[:dimensions], anchors_m[number], height_m, work[1, :dimensions])
-            error = abs(range_m[number] - distance - x[2 * dimensions] - x[2 * dimensions + 1 + slots[number]])
+            error = abs(range_m[number] - distance - x[2 * dimensions] - x[first_link + slots[number]])
             if error <= least:
                 best, least = number, error
     return best
