@@ -4,6 +4,7 @@ Steps are those of the simulated N100 through dead reckoning; ranges and accumul
 links judged by the shipped classifier, ranges freed from their bias by received power, as in a live graph.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -21,7 +22,7 @@ from mine_loc_pdr.fdilink import ImuFrame
 from mine_loc_pdr.n100_axes import flu_from_frd
 from mine_loc_pdr.stride import PendulumStrideModel
 from mine_loc_sim.gait import Person, draw_person
-from mine_loc_sim.imu_errors import DeviceErrors, draw_device
+from mine_loc_sim.imu_errors import draw_device
 from mine_loc_sim.magnetic_field import GalleryField
 from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.n100_device import N100Device
@@ -41,8 +42,8 @@ SCENES = Path(__file__).parent / "fusion_scenes"
 _MODEL = Path(__file__).parent.parent / "src/mine_loc_uwb/mine_loc_uwb/models/los.safetensors"
 _CHUNK = 16  # rounds the channel is asked for at a time
 _WHITE_SD_M = 0.03
-_KNOWN_M = 50.0
-_CALIBRATION_SD = 0.03  # one walk of a person differs from the next by so much (docs/pdr.md)
+_FIRST_LEG_M = 20.0
+_CALIBRATED_SD = 0.03  # one walk of a person differs from the next by so much (docs/pdr.md)
 _START_NS = 10 * NS_PER_S  # stamps begin well above zero
 
 
@@ -64,7 +65,7 @@ class Walk:
     truth_m: Array
     start_m: Array
     start_yaw_rad: float
-    """Of the odom frame in the map."""
+    """Of the odom frame in the map, as found on the first leg, where the course is known."""
 
 
 def scene(name: str) -> dict[str, Any]:
@@ -81,41 +82,59 @@ def seeds(of: Mapping[str, Any], purpose: str) -> range:
 
 def make_walk(of: Mapping[str, Any], seed: int) -> Walk:
     """Play one lap."""
-    who, walking, worn, device, field, radio, detours, stride, known = np.random.default_rng(seed).spawn(9)
-    person, errors = draw_person(who), draw_device(worn)
+    who, walking, worn, device, field, radio, detours, known = np.random.default_rng(seed).spawn(8)
+    person = draw_person(who, preferred_speed_m_s=who.uniform(*of["speed_m_s"]))
+    errors = draw_device(worn)
     corners = [WayPoint((*corner, 0.0)) for corner in of["corners_m"]]
     corners[0] = replace(corners[0], pause_s=of["stand_s"])
     corners[-1] = replace(corners[-1], pause_s=of["stand_s"])
     walker = _walker(person, corners, walking)
     stop_ns = _START_NS + to_ns(walker.duration_s)
-    scale = _calibrated_scale(person, errors, known) * float(np.exp(of["stride_error"] * stride.standard_normal()))
-    model = PendulumStrideModel(person.height_m, scale, of["stride_error"] ** 2 + _CALIBRATION_SD**2)
-    steps = _steps(model, N100Device(errors, walker, GalleryField(field), device), stop_ns)
+    steps = _steps(person, N100Device(errors, walker, GalleryField(field), device), stop_ns)
+    steps = _scaled(of, steps, math.exp(of["stride_error"] * known.standard_normal()))
     stamp_ns = np.arange(_START_NS, stop_ns, to_ns(of["period_s"]))
     motion = walker.motion(stamp_ns)
     tag_m = motion.position_m.copy()
     tag_m[:, 2] = of["tag_height_m"]
     rounds = _rounds(of, stamp_ns, tag_m, motion.heading_rad, radio, detours)
-    return Walk(rounds, steps, tag_m[:, :2], tag_m[0, :2], float(motion.heading_rad[0]))
+    return Walk(rounds, steps, tag_m[:, :2], tag_m[0, :2], _known_yaw_rad(of, walker, steps))
+
+
+def _known_yaw_rad(of: Mapping[str, Any], walker: Walker, steps: Sequence[ReportedStep]) -> float:
+    """Yaw of odom on the way to the first corner, where the course is known."""
+    x_m = walker.motion(np.array([step.stamp_ns for step in steps])).position_m[:, 0]
+    on_first_leg = steps[: int(np.argmax(x_m > _FIRST_LEG_M))]
+    first, second = of["corners_m"][:2]
+    course_rad = math.atan2(second[1] - first[1], second[0] - first[0])
+    off = [math.remainder(course_rad - step.fix.heading_rad, math.tau) for step in on_first_leg]
+    return float(np.mean(off))
 
 
 def _walker(person: Person, way_points: Sequence[WayPoint], rng: np.random.Generator) -> Walker:
     return Walker(person, plan_route(way_points, person.preferred_speed_m_s), rng, start_ns=_START_NS)
 
 
-def _calibrated_scale(person: Person, errors: DeviceErrors, rng: np.random.Generator) -> float:
-    """K of the person, from a straight walk of known length as `mine-loc calibrate-stride` takes."""
-    walking, device, field = rng.spawn(3)
-    ends = [WayPoint((0.0, 0.0, 0.0), pause_s=3.0), WayPoint((_KNOWN_M, 0.0, 0.0), pause_s=2.0)]
-    walker = _walker(person, ends, walking)
-    n100 = N100Device(errors, walker, GalleryField(field), device)
-    steps = _steps(PendulumStrideModel(person.height_m), n100, _START_NS + to_ns(walker.duration_s))
-    return _KNOWN_M / sum(step.fix.length_m for step in steps)
+def _lap_m(of: Mapping[str, Any]) -> float:
+    return float(np.linalg.norm(np.diff(np.array(of["corners_m"], float), axis=0), axis=1).sum())
 
 
-def _steps(model: PendulumStrideModel, n100: N100Device, stop_ns: int) -> list[ReportedStep]:
-    """Through dead reckoning; its x axis is where the person faced at the start."""
-    pdr = PedestrianDeadReckoning(model)
+def _scaled(of: Mapping[str, Any], steps: Sequence[ReportedStep], scale: float) -> list[ReportedStep]:
+    """Steps of a person whose K is known but for an error: their lengths add up to `scale` times the lap."""
+    k = scale * _lap_m(of) / sum(step.fix.length_m for step in steps)
+    return [
+        replace(
+            step,
+            fix=replace(
+                step.fix, length_m=k * step.fix.length_m, length_variance_m2=k**2 * step.fix.length_variance_m2
+            ),
+        )
+        for step in steps
+    ]
+
+
+def _steps(person: Person, n100: N100Device, stop_ns: int) -> list[ReportedStep]:
+    """Through dead reckoning; its x axis is where the sensor faced at the start."""
+    pdr = PedestrianDeadReckoning(PendulumStrideModel(person.height_m, scale_variance=_CALIBRATED_SD**2))
     steps = []
     for stamp_ns, frame in n100.frames(stop_ns):
         if not isinstance(frame, ImuFrame):
@@ -182,8 +201,7 @@ def _wearer(of: Mapping[str, Any], rng: np.random.Generator) -> Wearer:
 def _detours_m(of: Mapping[str, Any], tag_m: Array, count: int, rng: np.random.Generator) -> Array:
     """Excess way (rounds, anchors) of what comes round; it rises and falls along a stretch. 0 = in sight."""
     moved_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tag_m[:, :2], axis=0), axis=1))])
-    lap_m = np.linalg.norm(np.diff(np.array(of["corners_m"], float), axis=0), axis=1).sum()
-    way_m = moved_m * lap_m / moved_m[-1]  # without the sway of the waist
+    way_m = moved_m * _lap_m(of) / moved_m[-1]  # without the sway of the waist
     detour_m = np.zeros((len(tag_m), count))
     for stretch in of["stretches_m"]:
         along = (way_m - stretch["from"]) / (stretch["to"] - stretch["from"])

@@ -18,7 +18,7 @@ ALLOWED = {
     "mine_loc_core": set(),
     "mine_loc_uwb": {"mine_loc_core"},
     "mine_loc_pdr": {"mine_loc_core"},
-    "mine_loc_fusion": {"mine_loc_core"},
+    "mine_loc_fusion": {"mine_loc_core", "mine_loc_uwb"},
     "mine_loc_coarse": {"mine_loc_core"},
     "mine_loc_sim": {"mine_loc_core", "mine_loc_uwb", "mine_loc_pdr", "mine_loc_fusion", "mine_loc_coarse"},
 }

@@ -7,6 +7,7 @@ agree, if more do than the place has coordinates and the person can have got the
 capture it).
 """
 
+import copy
 import math
 from dataclasses import replace
 
@@ -66,6 +67,13 @@ class RobustTracker:
         self._known = b"", np.empty(0, np.int64)
         self._link_nlos = np.empty(0)
 
+    def copy(self) -> "RobustTracker":
+        """A tracker in the same state that goes its own way."""
+        other = copy.copy(self)
+        for name in ("x", "P", "_link_nlos", "_slot"):  # what changes in place
+            setattr(other, name, getattr(self, name).copy())
+        return other
+
     @property
     def started(self) -> bool:
         """Whether there is a place."""
@@ -76,12 +84,16 @@ class RobustTracker:
         """Where the biases of links begin in the state."""
         return len(self.x) - len(self._link_nlos)
 
+    @property
+    def dimensions(self) -> int:
+        """How many coordinates a place has."""
+        return (self.first_link - self._own_states - 1) // 2
+
     def advance(self, stamp_ns: int) -> None:
         """Predict the state to an instant; to an earlier one than that of the state nothing changes."""
         gone_s = (stamp_ns - self._stamp_ns) / NS_PER_S
         if self.started and gone_s > 0.0:
-            d = (self.first_link - self._own_states - 1) // 2
-            kernel.predict(self.x, self.P, d, self.first_link, gone_s, self._noise)
+            kernel.predict(self.x, self.P, self.dimensions, self.first_link, gone_s, self._noise)
             self._stamp_ns = stamp_ns
 
     def solve(self, measurements: Measurements) -> Solution:

@@ -33,8 +33,9 @@ Integers = npt.NDArray[np.int64]
     LEVEL_EXPONENT,
     LEVEL_SD,
     SYSTEMATIC_SD,
+    JUDGEMENT_WEIGHT,
     SETTINGS,
-) = range(15)
+) = range(16)
 """Places of the settings in the array `noise`, and how many they are."""
 
 ACCEPTED, TOO_LONG, TOO_SHORT, IMPOSSIBLE, CONTESTED = range(5)

@@ -12,6 +12,7 @@ from mine_loc_uwb.tracker_kernel import (
     ACCEPTED,
     CONTESTED,
     IMPOSSIBLE,
+    JUDGEMENT_WEIGHT,
     LEVEL_SD,
     NLOS_GROWTH,
     NLOS_SCALE,
@@ -73,7 +74,7 @@ def take_round(
     work = np.empty((3, len(x)))
     x_before, P_before, nlos_before = x.copy(), P.copy(), link_nlos.copy()
     fresh = min(gone_s / noise[NLOS_TIME], 1.0)
-    memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
+    memory, share, weight = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE], noise[JUDGEMENT_WEIGHT]
     for slot in range(len(link_nlos)):  # of all links, heard or not
         link_nlos[slot] = share + memory * (link_nlos[slot] - share)
     todo = np.ones(len(range_m), np.bool_)
@@ -81,7 +82,7 @@ def take_round(
         first = _surest(level_dbm, noise)
         todo[first] = False
         slot = slots[first]
-        belief = _shifted(link_nlos[slot], los_probability[first])
+        belief = _shifted(link_nlos[slot], los_probability[first], weight)
         codes[first], deviances[first] = ACCEPTED, 0.0
         open_offset(
             x, P, dimensions, first_link, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first],
@@ -91,13 +92,13 @@ def take_round(
         number = _most_credible(x, dimensions, first_link, anchors_m, slots, range_m, height_m, todo, work)
         todo[number] = False
         slot = slots[number]
-        belief = _shifted(link_nlos[slot], los_probability[number])
+        belief = _shifted(link_nlos[slot], los_probability[number], weight)
         codes[number], deviances[number], nlos = take_range(
             x, P, dimensions, first_link, anchors_m[number], slot, range_m[number], variance_m2[number],
             since_s[number], height_m, belief, _scale_m(level_dbm[number], noise), fresh,
             gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
-        link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number])  # the judgement taken out again
+        link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number], weight)  # the judgement taken out again
     if noise[LEVEL_SD] > 0.0:
         for number in range(len(range_m)):
             if codes[number] == ACCEPTED and not math.isnan(level_dbm[number]):
@@ -190,11 +191,11 @@ def _surest(level_dbm: Array, noise: Array) -> int:
 
 
 @njit(cache=True)
-def _shifted(belief: float, los_probability: float) -> float:
-    """Belief in an obstruction after a judgement of the link; NaN = there is none."""
+def _shifted(belief: float, los_probability: float, weight: float) -> float:
+    """Belief in an obstruction after a judgement of the link whose odds count by `weight`; NaN = there is none."""
     if not math.isnan(los_probability):
-        against = belief * (1.0 - los_probability)
-        belief = against / (against + (1.0 - belief) * los_probability)
+        against = belief * (1.0 - los_probability) ** weight
+        belief = against / (against + (1.0 - belief) * los_probability**weight)
     return min(max(belief, _LEAST_NLOS), _MOST_NLOS)
 
 

@@ -227,9 +227,14 @@ def test_belief_in_an_obstruction_fades_to_the_share_of_obstructed_links_while_t
 
 @pytest.mark.parametrize(("los", "low", "high"), [(0.0, 0.97, 0.97), (1.0, 0.01, 0.01), (0.5, 0.5, 0.5)])
 def test_a_judgement_of_the_link_shifts_the_belief_within_its_bounds(los, low, high):
-    assert low <= tracker_round._shifted(0.5, los) <= high
+    assert low <= tracker_round._shifted(0.5, los, 1.0) <= high
 
 
 def test_no_judgement_leaves_the_belief():
-    assert tracker_round._shifted(0.3, math.nan) == 0.3
-    assert tracker_round._shifted(0.3, 0.8) == pytest.approx(0.3 * 0.2 / (0.3 * 0.2 + 0.7 * 0.8))
+    assert tracker_round._shifted(0.3, math.nan, 1.0) == 0.3
+    assert tracker_round._shifted(0.3, 0.8, 1.0) == pytest.approx(0.3 * 0.2 / (0.3 * 0.2 + 0.7 * 0.8))
+
+
+def test_odds_of_a_judgement_count_by_their_weight():
+    odds = [tracker_round._shifted(0.5, 0.8, weight) for weight in (0.0, 0.5, 1.0)]
+    assert [value / (1.0 - value) for value in odds] == pytest.approx([1.0, 0.5, 0.25])
