@@ -60,3 +60,8 @@ FEATURES: Mapping[str, Callable[[ActivityWindow], Array]] = {
 def matrix(name: str, windows: Sequence[ActivityWindow]) -> Array:
     """(n, d) features of set `name`, a row a window."""
     return np.array([FEATURES[name](window) for window in windows])
+
+
+def width(name: str) -> int:
+    """Number of features in set `name`."""
+    return len(FEATURES[name](ActivityWindow(0, np.zeros(BINS + 1), np.zeros(BINS), np.zeros(BINS))))

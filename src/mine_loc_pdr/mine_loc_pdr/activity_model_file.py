@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_pdr.activity import ActivityModel, Logistic
-from mine_loc_pdr.activity_features import FEATURES, SMOOTHED_BINS
+from mine_loc_pdr.activity_features import FEATURES, SMOOTHED_BINS, width
 from mine_loc_pdr.activity_svm import POLY_DEGREE, POLY_OFFSET, Svm
 from mine_loc_pdr.activity_window import BIN_NS, BINS
 
@@ -72,9 +72,8 @@ def load_model(path: Path) -> tuple[ActivityModel, dict[str, Any]]:
         raise ConfigurationError(
             f"{path}: features {features}, kernel {kernel}; allowed: {', '.join(FEATURES)}; {', '.join(_KERNELS)}"
         )
-    support = _numbers(path, arrays, "support", (-1, -1))
-    count, width = support.shape
-    mean, scale = (_numbers(path, arrays, name, (width,)) for name in ("mean", "scale"))
+    support = _numbers(path, arrays, "support", (-1, width(features)))
+    mean, scale = (_numbers(path, arrays, name, support.shape[1:]) for name in ("mean", "scale"))
     if not (scale > 0.0).all():
         raise ConfigurationError(f"{path}: scale {scale.min()}; allowed: above 0")
     svm = Svm(
@@ -83,7 +82,7 @@ def load_model(path: Path) -> tuple[ActivityModel, dict[str, Any]]:
         mean,
         scale,
         support,
-        _numbers(path, arrays, "coefficient", (count,)),
+        _numbers(path, arrays, "coefficient", support.shape[:1]),
         float(_numbers(path, arrays, "intercept", ())),
     )
     walking, turning = (Logistic(*_numbers(path, arrays, name, (2,)).tolist()) for name in ("walking", "turning"))

@@ -20,6 +20,7 @@ BINS = 20
 WINDOW_NS = BINS * BIN_NS  # 4 s, paper B section 4.2
 HOP_NS = NS_PER_S  # from one window to the next
 CLOCK_JUMP_NS = NS_PER_S  # a step back by more is a new clock, not a late sample
+LARGEST_M_S2 = 1000.0  # beyond the range of any such sensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +50,9 @@ class _Bin:
 class WindowStream:
     """Takes one person's samples and gives a window each `hop_ns` of time, a multiple of BIN_NS.
 
-    It is reported with the first sample at or after its end. Samples out of order are dropped. A gap longer than
-    BIN_NS or a clock set back begins anew: for four seconds there is no window then.
+    It is reported with the first sample at or after its end. Samples out of order or beyond any sensor are dropped, as
+    dead reckoning drops them. A gap longer than BIN_NS or a clock set back begins anew: for four seconds there is no
+    window then.
     """
 
     def __init__(self, hop_ns: int = HOP_NS) -> None:
@@ -67,7 +69,7 @@ class WindowStream:
         vertical_m_s2 = math.sqrt(fx * fx + fy * fy + fz * fz) - STANDARD_GRAVITY_M_S2
         last_ns = self._last_ns
         dt_ns = BIN_NS + 1 if last_ns is None else stamp_ns - last_ns
-        if -CLOCK_JUMP_NS <= dt_ns <= 0 or not math.isfinite(vertical_m_s2):
+        if -CLOCK_JUMP_NS <= dt_ns <= 0 or not vertical_m_s2 <= LARGEST_M_S2:
             return None
         window = None
         if last_ns is None or not 0 < dt_ns <= BIN_NS:
