@@ -74,7 +74,7 @@ def sim(training: Sequence[LabelledWindow]) -> dict[str, Any]:
         "standing": share([kind == each.label for each, kind in first_tiling(scored) if is_standing(each)]),
         "tilings": tilings(scored),
         "starts_and_halts": counts["unknown"],
-        "undecidable": sum(not each.decidable for each, _ in first_tiling(by_model)),
+        "undecidable": sum(not each.decidable and each.label in MOVING.values() for each, _ in first_tiling(by_model)),
         "with_undecidable": accuracies(first_tiling(by_model)),
         "plain_threshold": accuracies(first_tiling([pair for pair in by_threshold if pair[0].decidable]))
         | {"with_undecidable": accuracies(first_tiling(by_threshold))},
