@@ -1,5 +1,8 @@
 """The decision function in numpy is that of the machine which scikit-learn trained."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
@@ -39,3 +42,8 @@ def test_the_sum_over_support_vectors_is_that_of_paper_b():
     z = (4.0 - 1.0) / 2.0
     expected = -2.0 * np.exp(-0.5 * z**2) + 3.0 * np.exp(-0.5 * (z - 1.0) ** 2) + 0.25
     assert svm.decision(np.array([[4.0]])) == pytest.approx([expected])
+
+
+def test_what_the_node_loads_needs_no_scikit_learn():
+    code = "import sys, mine_loc_pdr.activity, mine_loc_pdr.activity_model_file as f; f.load_model(f.shipped_model()); "
+    subprocess.run([sys.executable, "-c", code + "assert 'sklearn' not in sys.modules"], check=True)
