@@ -18,6 +18,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core: before numpy is loade
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
+import pdr_activity
 import pdr_distance
 import pdr_heading
 import pdr_recordings
@@ -50,7 +51,12 @@ def mobgap() -> dict[str, Any]:
     return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
 
 
-PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {"ipol": ipol, "oxford": oxford, "mobgap": mobgap}
+PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "ipol": ipol,
+    "oxford": oxford,
+    "mobgap": mobgap,
+    "activity": pdr_activity.activity,
+}
 
 
 def table(figures: Mapping[str, Any]) -> Table:
@@ -66,7 +72,8 @@ def _leaves(node: Mapping[str, Any], path: str) -> list[tuple[str, str]]:
     for name, value in node.items():
         here = f"{path}.{name}".lstrip(".")
         if isinstance(value, dict) and "mean" in value:
-            rows.append((here, f"{value['mean']} ± {value['sd']} (max {value['max']})"))
+            end = "max" if "max" in value else "min"
+            rows.append((here, f"{value['mean']} ± {value['sd']} ({end} {value[end]})"))
         elif isinstance(value, dict):
             rows += _leaves(value, here)
         else:

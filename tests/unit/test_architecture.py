@@ -34,6 +34,7 @@ ROSDEP = {  # import name → rosdep key
     "rich": "python3-rich",
     "matplotlib": "python3-matplotlib",
     "numba": "python3-numba",
+    "sklearn": "python3-sklearn",
 }
 MOST_LINES = 400
 

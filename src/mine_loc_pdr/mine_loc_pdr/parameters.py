@@ -30,3 +30,6 @@ class PdrParameters(NodeParameters):
     """Parameters of `pdr`."""
 
     odometry_rate: float = parameter(10.0, "of <person>/odometry and /tf", unit="Hz", low=0.1, high=200.0)
+    activity_model: str = parameter(
+        "", "file written by mine-loc train-activity; empty = the one that is shipped", read_only=True
+    )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import TransformStamped
+from mine_loc_interfaces.msg import Activity as ActivityMessage
 from mine_loc_interfaces.msg import Step
 from mine_loc_interfaces.srv import Reset
 from nav_msgs.msg import Odometry
@@ -22,6 +23,8 @@ from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.stamps import NS_PER_S
+from mine_loc_pdr.activity import Activity, ActivityModel, ActivityRecogniser
+from mine_loc_pdr.activity_model_file import load_model, shipped_model
 from mine_loc_pdr.dead_reckoning import ImuSample, OdometryPose, PedestrianDeadReckoning, StepEvent
 from mine_loc_pdr.parameters import PdrParameters
 from mine_loc_pdr.stride import stride_model
@@ -34,9 +37,10 @@ _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says noth
 class Track:
     """One person's dead reckoning and the ends of its topics."""
 
-    def __init__(self, person: Person, n100: N100) -> None:
+    def __init__(self, person: Person, n100: N100, activities: ActivityModel) -> None:
         self.person = person
         self._n100 = n100
+        self._activities = activities
         self.subscription: Any = None
         self.odometry: Any = None
         self.heard_s = time.monotonic()
@@ -48,12 +52,18 @@ class Track:
         mounting = quaternion.from_euler_zyx(*self._n100.mounting_rpy_rad)
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
         self.pdr = PedestrianDeadReckoning(stride_model(self.person), (float(x), float(y), float(z)))
+        self._recogniser = ActivityRecogniser(self._activities)
         self.published_period = 0
         self.samples = 0
 
+    def recognise(self, sample: ImuSample) -> Activity | None:
+        """The activity of the window that ends with a sample which dead reckoning has taken."""
+        heading_rad = self.pdr.heading_rad
+        return None if heading_rad is None else self._recogniser.push(sample.stamp_ns, heading_rad, sample.force_m_s2)
+
 
 class Pdr(NodeBase):
-    """Publishes pdr/steps, and for each person <person>/odometry and the transform of base_link in odom."""
+    """Publishes pdr/steps, pdr/activity, and each person's <person>/odometry and transform of base_link in odom."""
 
     parameter_class = PdrParameters
 
@@ -64,6 +74,9 @@ class Pdr(NodeBase):
         """Read the people and listen to each who wears an N100."""
         self._tracks: dict[str, Track] = {}
         self._file = PeopleFile(Path(self.parameters.site))
+        model = self.parameters.activity_model
+        self._activity_model, _ = load_model(Path(model) if model else shipped_model())
+        self._activities = self.publish_to(ActivityMessage, "pdr/activity", EVENTS)
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
         self._follow(self._file.people)
@@ -98,7 +111,7 @@ class Pdr(NodeBase):
                 self._tracks[name] = self._new_track(person, person.n100)
 
     def _new_track(self, person: Person, n100: N100) -> Track:
-        track = Track(person, n100)
+        track = Track(person, n100, self._activity_model)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
         track.subscription = self.subscribe(
             Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM
@@ -108,11 +121,14 @@ class Pdr(NodeBase):
     def _on_imu(self, track: Track, message: Imu) -> None:
         rate, force = message.angular_velocity, message.linear_acceleration
         stamp_ns = to_stamp_ns(message.header.stamp)
-        step = track.pdr.push(ImuSample(stamp_ns, (rate.x, rate.y, rate.z), (force.x, force.y, force.z)))
+        sample = ImuSample(stamp_ns, (rate.x, rate.y, rate.z), (force.x, force.y, force.z))
+        step = track.pdr.push(sample)
         track.samples += 1
         track.heard_s = time.monotonic()
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
+        if (activity := track.recognise(sample)) is not None:
+            self._activities.publish(_activity(track.person.name, activity))
         period = stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
@@ -169,6 +185,17 @@ def _step(person: str, step: StepEvent) -> Step:
         heading_variance=step.heading_variance_rad2,
         position=to_point((step.x_m, step.y_m, 0.0)),
         confidence=step.confidence,
+    )
+
+
+def _activity(person: str, activity: Activity) -> ActivityMessage:
+    return ActivityMessage(
+        header=Header(stamp=to_time(activity.stamp_ns), frame_id=f"{person}/odom"),
+        person=person,
+        activity=int(activity.kind),
+        probability=activity.probability,
+        window=activity.window_s,
+        turn_angle=activity.turn_rad,
     )
 
 
