@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import pdr_distance
 import pdr_heading
+import pdr_paper_b
 import pdr_recordings
 import pdr_steps
 from pdr_tracks import track
@@ -50,7 +51,12 @@ def mobgap() -> dict[str, Any]:
     return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
 
 
-PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {"ipol": ipol, "oxford": oxford, "mobgap": mobgap}
+PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "ipol": ipol,
+    "oxford": oxford,
+    "mobgap": mobgap,
+    "paper_b": pdr_paper_b.paper_b,
+}
 
 
 def table(figures: Mapping[str, Any]) -> Table:
