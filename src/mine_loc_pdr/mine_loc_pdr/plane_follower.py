@@ -13,6 +13,7 @@ from mine_loc_pdr.pseudo_plane import LandmarkFix, PseudoPlane
 from mine_loc_pdr.turns import TurnDetector
 
 CLOCK_JUMP_NS = NS_PER_S  # a step back by more is a new clock
+POSE_AGE_NS = NS_PER_S  # a person does not walk far in it
 
 
 class PlaneFollower:
@@ -22,6 +23,7 @@ class PlaneFollower:
         self._plane, self._galleries = plane, galleries
         self._turns = TurnDetector()
         self._track: MapTrack | None = None
+        self._verdicts: Counter[str] = Counter()
         self._last_ns: int | None = None
         self._heading_rad = 0.0
 
@@ -31,21 +33,23 @@ class PlaneFollower:
         return None if self._track is None else self._track.pose()
 
     @property
-    def faults(self) -> Counter[str]:
-        """Of turns and track: what was dropped and why."""
-        counted = Counter({f"heading_{name}": count for name, count in self._turns.faults.items() if count})
-        return counted + (self._track.faults if self._track else Counter())
+    def counts(self) -> Counter[str]:
+        """Turns by verdict, and what was dropped and why; of the track since its pose was given."""
+        headings = Counter({f"heading_{name}": count for name, count in self._turns.faults.items()})
+        return self._verdicts + headings + (self._track.faults if self._track else Counter())
 
-    def set_pose(self, pose: MapPose, scale_variance: float, rate_sd_rad_s: float) -> bool:
-        """Begin the track where the person is at the last sample; False if there was none yet.
+    def set_pose(self, pose: MapPose, scale_variance: float, rate_sd_rad_s: float) -> str | None:
+        """Begin the track with a pose that holds at the last sample (stamp 0), or did a moment before; or say why not.
 
         `scale_variance` and `rate_sd_rad_s`: what dead reckoning claims for its step scale and for its heading's drift.
         """
         if self._last_ns is None:
-            return False
+            return "no horizon yet; allowed: after half a second of samples"
+        if pose.stamp_ns and abs(pose.stamp_ns - self._last_ns) > POSE_AGE_NS:
+            return f"stamp {pose.stamp_ns} is not now; allowed: within 1 s of the last sample, {self._last_ns}, or 0"
         now = MapPose(self._last_ns, pose.x_m, pose.y_m, pose.yaw_rad, pose.covariance)
         self._track = MapTrack(now, self._heading_rad, scale_variance, rate_sd_rad_s, self._plane, self._galleries)
-        return True
+        return None
 
     def push(self, stamp_ns: int, heading_rad: float, step: StepEvent | None) -> LandmarkFix | None:
         """Take the heading in odom at a sample and the step that was completed with it."""
@@ -56,7 +60,10 @@ class PlaneFollower:
             return None
         if step is not None:
             self._track.step(step)
-        return None if turn is None else self._track.turn(turn)
+        fix = None if turn is None else self._track.turn(turn)
+        if fix is not None:
+            self._verdicts[fix.verdict.name.lower()] += 1
+        return fix
 
     def _bridge(self, stamp_ns: int) -> None:
         last_ns, self._last_ns = self._last_ns, stamp_ns
