@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 X, Y, YAW, RATE, SCALE = range(5)
 HISTORY_NS = 10 * NS_PER_S  # longer than the longest turn and its report
 LONGEST_STEP_M = 2.0
+MISSED_STRAIGHT_SHARE = 0.01  # measured: steps of straight walking in ipol_gait_lowerback (docs/pdr.md)
 # Assumed: who turns so far between two steps may have made the second on the spot or in full. In between, its length
 # lies evenly between the share that is left and the whole.
 ON_THE_SPOT_RAD = math.pi / 2
@@ -156,7 +157,8 @@ class MapTrack:
         transition[:2, YAW] = scale * length_m * aside
         transition[:2, SCALE] = length_m * ahead
         self._propagate(transition)
-        along_m2 = STEP_TO_STEP_SD_M**2 + (MISSED_STEP_SHARE + 1.0 - step.confidence) * step.length_m**2
+        missed = MISSED_STEP_SHARE if step.interval_s is None or on_the_spot > 0.0 else MISSED_STRAIGHT_SHARE
+        along_m2 = STEP_TO_STEP_SD_M**2 + (missed + 1.0 - step.confidence) * step.length_m**2
         along_m2 += (on_the_spot * step.length_m) ** 2 / 12.0
         across_m2 = (length_m * DIRECTION_SD_RAD) ** 2
         self._covariance[:2, :2] += along_m2 * np.outer(ahead, ahead) + across_m2 * np.outer(aside, aside)

@@ -17,7 +17,7 @@ RATE_SPAN_NS = 300 * NS_PER_MS  # over which the rate of the average is taken
 LONGEST_GAP_NS = 200 * NS_PER_MS
 # Of the averaged heading. A curved gallery of 10 m radius turns a walker by 7 °/s, a corner by 40 °/s and more.
 BEGIN_RATE_RAD_S = math.radians(20.0)
-END_RATE_RAD_S = math.radians(10.0)
+END_RATE_RAD_S = math.radians(15.0)
 LEAST_ANGLE_RAD = math.radians(25.0)  # below it a stride's own unrest may be the cause
 LONGEST_TURN_NS = 6 * NS_PER_S  # beyond it a person walks in a circle
 # Assumed: of the mean facing over a stride against the course walked, each of before and after the turn.
