@@ -182,7 +182,7 @@ def score_scene(scene: Scene) -> dict[str, Any]:
         turn_ways.append(crew.walk("turn_way_m"))
         route_ways.append(crew.walk("route_way_m"))
     figures: dict[str, Any] = {"people": len(turn_ways[0]), "seeds": len(turn_ways), "per_person": {}, "averaged": {}}
-    figures["turns_of_routes"] = sum(len(walk.walker.turns()) for walks in route_ways for walk in walks)
+    figures["corners_of_routes"] = sum(_corners(walk) for walks in route_ways for walk in walks)
     for name, method in methods(scene).items():
         turn = [[follow(method(walk), walk) for walk in walks] for walks in turn_ways]
         route = [[follow(method(walk), walk) for walk in walks] for walks in route_ways]
@@ -193,6 +193,11 @@ def score_scene(scene: Scene) -> dict[str, Any]:
         if len(route[0][0].nees):
             figures[f"route_{name}_nees"] = round(float(np.mean([s.nees.mean() for c in route for s in c])), 2)
     return figures
+
+
+def _corners(walk: Walk) -> int:
+    """Turns that a marker may be meant by, without the wandering along a leg."""
+    return sum(abs(turn.angle_rad) > math.radians(45.0) for turn in walk.walker.turns())
 
 
 def _per_person(
