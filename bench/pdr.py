@@ -1,9 +1,9 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap paper_b]
 
-Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); docs/pdr.md
-explains the rows.
+Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); paper_b
+is simulated. docs/pdr.md explains the rows.
 """
 
 import argparse

@@ -81,7 +81,8 @@ class MapTrack:
         self._covariance[:3, :3] = start.covariance
         self._covariance[RATE, RATE] = rate_sd_rad_s**2
         self._covariance[SCALE, SCALE] = scale_variance
-        self._stamp_ns, self._heading_rad = start.stamp_ns, facing_rad
+        self._start_ns = self._stamp_ns = start.stamp_ns
+        self._heading_rad = facing_rad
         self._walked: deque[tuple[int, float, float]] = deque([(start.stamp_ns, 0.0, 0.0)])
         self._straight_m = 0.0
         self.faults: Counter[str] = Counter()
@@ -111,7 +112,8 @@ class MapTrack:
         if corner is None:
             self.faults["forgotten"] += 1
             return None
-        if not any(turn.begin_ns - BEFORE_TURN_NS <= stamp_ns <= turn.end_ns for stamp_ns, _, _ in self._walked):
+        since_ns = max(turn.begin_ns - BEFORE_TURN_NS, self._start_ns + 1)
+        if not any(since_ns <= stamp_ns <= turn.end_ns for stamp_ns, _, _ in self._walked):
             self.faults["standing"] += 1
             return None
         place_m, design = self._place_before(corner.since)

@@ -76,8 +76,8 @@ class TurnDetector:
     def _average(self, stamp_ns: int, heading_rad: float) -> tuple[int, float] | None:
         """The mean heading over the stride that ends here, stamped with its middle; None before there is one."""
         headings = self._headings
-        if headings:
-            heading_rad = headings[-1][1] + math.remainder(heading_rad - headings[-1][1], math.tau)
+        before_rad = headings[-1][1] if headings else 0.0
+        heading_rad = before_rad + math.remainder(heading_rad - before_rad, math.tau)
         headings.append((stamp_ns, heading_rad))
         self._sum_rad += heading_rad
         full = False

@@ -105,6 +105,9 @@ def test_who_looks_about_standing_is_at_no_marker():
     followed = walk(track(), [0.0] * 29)
     assert followed.turn(turn_at(40)) is None
     assert followed.faults["standing"] == 1
+    just_told = track()
+    assert just_told.turn(turn_at(1)) is None
+    assert just_told.faults["standing"] == 1
 
 
 def test_a_turn_too_old_to_place_is_counted_and_dropped():
