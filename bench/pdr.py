@@ -1,9 +1,9 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap paper_b]
 
-Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); docs/pdr.md
-explains the rows.
+Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); paper_b
+is simulated. docs/pdr.md explains the rows.
 """
 
 import argparse
@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import pdr_activity
 import pdr_distance
 import pdr_heading
+import pdr_paper_b
 import pdr_recordings
 import pdr_steps
 from pdr_tracks import track
@@ -56,6 +57,7 @@ PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "oxford": oxford,
     "mobgap": mobgap,
     "activity": pdr_activity.activity,
+    "paper_b": pdr_paper_b.paper_b,
 }
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from geometry_msgs.msg import TransformStamped
 from mine_loc_interfaces.msg import Activity as ActivityMessage
-from mine_loc_interfaces.msg import Step
-from mine_loc_interfaces.srv import Reset
+from mine_loc_interfaces.msg import LandmarkFix, Step
+from mine_loc_interfaces.srv import Reset, SetPose
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
@@ -22,11 +22,17 @@ from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
+from mine_loc_core.site import Site, load_site
 from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_pdr.activity import Activity, ActivityModel, ActivityRecogniser
 from mine_loc_pdr.activity_model_file import load_model, shipped_model
 from mine_loc_pdr.dead_reckoning import ImuSample, OdometryPose, PedestrianDeadReckoning, StepEvent
+from mine_loc_pdr.gallery_constraint import GalleryConstraint
+from mine_loc_pdr.nodes.landmark_messages import to_landmark_fix, to_map_pose
 from mine_loc_pdr.parameters import PdrParameters
+from mine_loc_pdr.plane_follower import PlaneFollower
+from mine_loc_pdr.pseudo_plane import PseudoPlane
 from mine_loc_pdr.stride import stride_model
 
 _PEOPLE_PERIOD_S = 1.0
@@ -37,10 +43,11 @@ _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says noth
 class Track:
     """One person's dead reckoning and the ends of its topics."""
 
-    def __init__(self, person: Person, n100: N100, activities: ActivityModel) -> None:
+    def __init__(self, person: Person, n100: N100, activities: ActivityModel, site: Site) -> None:
         self.person = person
         self._n100 = n100
         self._activities = activities
+        self._site = site
         self.subscription: Any = None
         self.odometry: Any = None
         self.heard_s = time.monotonic()
@@ -53,6 +60,10 @@ class Track:
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
         self.pdr = PedestrianDeadReckoning(stride_model(self.person), (float(x), float(y), float(z)))
         self._recogniser = ActivityRecogniser(self._activities)
+        area = WalkableArea.of(self._site)
+        self.plane = PlaneFollower(
+            PseudoPlane(self._site.turn_markers), None if area is None else GalleryConstraint(area)
+        )
         self.published_period = 0
         self.samples = 0
 
@@ -63,7 +74,7 @@ class Track:
 
 
 class Pdr(NodeBase):
-    """Publishes pdr/steps, pdr/activity, and each person's <person>/odometry and transform of base_link in odom."""
+    """Publishes pdr/steps, pdr/activity, pdr/landmark_fix, and each person's <person>/odometry and transform."""
 
     parameter_class = PdrParameters
 
@@ -73,16 +84,19 @@ class Pdr(NodeBase):
     def configure(self) -> None:
         """Read the people and listen to each who wears an N100."""
         self._tracks: dict[str, Track] = {}
+        self._site = load_site(Path(self.parameters.site))
         self._file = PeopleFile(Path(self.parameters.site))
         model = self.parameters.activity_model
         self._activity_model, _ = load_model(Path(model) if model else shipped_model())
         self._activities = self.publish_to(ActivityMessage, "pdr/activity", EVENTS)
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
+        self._landmark_fixes = self.publish_to(LandmarkFix, "pdr/landmark_fix", EVENTS)
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
         self._follow(self._file.people)
         self.parameters_changed()
         self.every(_PEOPLE_PERIOD_S, self._poll_people)
         self.serve(Reset, "~/reset", self._reset)
+        self.serve(SetPose, "~/set_pose", self._set_pose)
 
     def parameters_changed(self) -> None:
         """Work out the period of the odometry."""
@@ -111,7 +125,7 @@ class Pdr(NodeBase):
                 self._tracks[name] = self._new_track(person, person.n100)
 
     def _new_track(self, person: Person, n100: N100) -> Track:
-        track = Track(person, n100, self._activity_model)
+        track = Track(person, n100, self._activity_model, self._site)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
         track.subscription = self.subscribe(
             Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM
@@ -129,10 +143,17 @@ class Pdr(NodeBase):
             self._steps.publish(_step(track.person.name, step))
         if (activity := track.recognise(sample)) is not None:
             self._activities.publish(_activity(track.person.name, activity))
+        self._follow_plane(track, stamp_ns, step)
         period = stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
             self._publish_pose(track, pose)
+
+    def _follow_plane(self, track: Track, stamp_ns: int, step: StepEvent | None) -> None:
+        if (heading_rad := track.pdr.heading_rad) is None:
+            return
+        if (fix := track.plane.push(stamp_ns, heading_rad, step)) is not None:
+            self._landmark_fixes.publish(to_landmark_fix(fix, track.person.name, self._site.map_frame))
 
     def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
         name = track.person.name
@@ -157,6 +178,17 @@ class Pdr(NodeBase):
             self._tracks[name].restart()
         return True, f"restarted: {', '.join(chosen) or 'nobody'}"
 
+    def _set_pose(self, request: Any) -> tuple[bool, str]:
+        track = self._tracks.get(request.person)
+        if track is None:
+            return False, f"{request.person!r}: wears no N100; known: {', '.join(self._tracks) or 'nobody'}"
+        pose = to_map_pose(request.pose, self._site.map_frame)
+        scale_variance = stride_model(track.person).scale_variance
+        refusal = track.plane.set_pose(pose, scale_variance, track.pdr.bias_sd_rad_s)
+        if refusal is not None:
+            return False, f"{request.person}: {refusal}"
+        return True, f"{request.person} is followed from there"
+
     def _track_health(self, track: Track) -> Health:
         name, pdr, silent_s = track.person.name, track.pdr, time.monotonic() - track.heard_s
         faults = sum(pdr.faults.values())
@@ -166,6 +198,7 @@ class Pdr(NodeBase):
         if pose is not None:
             values["heading_sd_deg"] = f"{math.degrees(math.sqrt(pose.covariance[2, 2])):.1f}"
             values["gyro_bias_sd_deg_s"] = f"{math.degrees(pdr.bias_sd_rad_s):.3f}"
+        values |= {f"landmark_{name}": count for name, count in track.plane.counts.items()}
         if silent_s > _SILENT_S:
             return Health(name, Level.ERROR, f"no samples for {silent_s:.1f} s", values)
         if new_faults:
