@@ -52,9 +52,7 @@ class RobustTracker:
     """
 
     def __init__(self, settings: RobustTrackerSettings | None = None, own_states: int = 0) -> None:
-        self._settings = settings or RobustTrackerSettings()
-        self._noise = self._settings.noise()
-        self._gate = chi2_quantile(self._settings.gate, 1)
+        self.believe(settings or RobustTrackerSettings())
         self._own_states = own_states
         self.x, self.P = np.empty(0), np.empty((0, 0))
         self.starts = 0
@@ -66,6 +64,12 @@ class RobustTracker:
         self._slot: dict[int, int] = {}
         self._known = b"", np.empty(0, np.int64)
         self._link_nlos = np.empty(0)
+
+    def believe(self, settings: RobustTrackerSettings) -> None:
+        """Take other settings from now on."""
+        self._settings = settings
+        self._noise = settings.noise()
+        self._gate = chi2_quantile(settings.gate, 1)
 
     def copy(self) -> "RobustTracker":
         """A tracker in the same state that goes its own way."""
