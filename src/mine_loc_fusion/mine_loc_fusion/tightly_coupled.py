@@ -6,7 +6,6 @@ estimated (`step_kernel`). Where there are no ranges, positions that somebody el
 coarse region is a place like them.
 """
 
-import copy
 import math
 from typing import Any, Self
 
@@ -86,8 +85,9 @@ class TightlyCoupled:
         if not tracker.started:
             return None
         d, ahead_s = tracker.dimensions, max(to_s(stamp_ns - self._stamp_ns), 0.0)
-        index = [0, 1, d, d + 1]
-        position, velocity, covariance = tracker.x[:2].copy(), tracker.x[d : d + 2].copy(), tracker.P[index][:, index]
+        index = np.array([0, 1, d, d + 1])
+        position, velocity = tracker.x[:2].copy(), tracker.x[d : d + 2].copy()
+        covariance = tracker.P[index[:, None], index]
         if ahead_s > 0.0:
             position += ahead_s * velocity
             covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
@@ -107,10 +107,12 @@ class TightlyCoupled:
         vars(self).update(vars(saved._copied()))  # noqa: SLF001 one of this class
 
     def _copied(self) -> Self:
-        other = copy.copy(self)
-        other._tracker = self._tracker.copy()  # noqa: SLF001
+        other = object.__new__(type(self))
+        state = vars(other)
+        state.update(vars(self))
+        state["_tracker"] = self._tracker.copy()
         if not self._yaw_known:
-            other._alignment = self._alignment.copy()  # noqa: SLF001
+            state["_alignment"] = self._alignment.copy()
         return other
 
     @property

