@@ -9,6 +9,8 @@ _COUNTS = 2**32
 _MOST_LOST = 10
 """So many messages in a row may be lost; a greater gap is another sender."""
 _LONGEST_REASON = 500
+_LONGEST_VALID_S = 5.0
+"""Nobody is permitted to run unheard for longer, whatever a message says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,26 +46,28 @@ class StopReceiver:
 
     def __init__(self) -> None:
         self._last: StopOrder | None = None
-        self._expires_ns: int | None = None
-        self._why = "no stop signal heard yet"
+        self._state: tuple[str, int | None] = ("no stop signal heard yet", None)
+        """Why it must stand, or the instant until which it may run. One object: another thread may read it any time."""
 
     def take(self, order: StopOrder, age_ns: int, steady_ns: int) -> None:
         """Take an order that was `age_ns` old (time of the stamps) when it arrived at `steady_ns`."""
         last, self._last = self._last, order
-        self._expires_ns = None
+        if order.stop or not 0.0 < order.valid_for_s <= _LONGEST_VALID_S:
+            self._state = order.reason or "told to stop", None
+            return
         valid_ns = to_ns(order.valid_for_s)
-        if order.stop:
-            self._why = order.reason or "told to stop"
-        elif last is None or not 1 <= (order.heartbeat - last.heartbeat) % _COUNTS <= _MOST_LOST:
-            self._why = "heartbeat does not go on"
+        if last is None or not 1 <= (order.heartbeat - last.heartbeat) % _COUNTS <= _MOST_LOST:
+            self._state = "heartbeat does not go on", None
         elif abs(age_ns) > valid_ns:
-            self._why = f"stop signal came {to_s(age_ns):.1f} s old"
-        else:
-            self._expires_ns = steady_ns + valid_ns - max(age_ns, 0)  # clocks of two hosts differ a little
-            self._why = ""
+            self._state = f"stop signal came {to_s(age_ns):.1f} s old", None
+        else:  # less than no age: clocks of two hosts differ a little
+            self._state = "", steady_ns + valid_ns - max(age_ns, 0)
+
+    def forget(self) -> None:
+        """The time of the stamps was set: ages that were told before do not hold."""
+        self._state = "clock was set", None
 
     def why_stop(self, steady_ns: int) -> str:
         """Why the machine must stand now; empty = it may run."""
-        if self._expires_ns is None:
-            return self._why
-        return "stop signal is silent" if steady_ns > self._expires_ns else ""
+        why, expires_ns = self._state
+        return "stop signal is silent" if expires_ns is not None and steady_ns > expires_ns else why

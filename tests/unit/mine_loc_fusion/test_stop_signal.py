@@ -1,5 +1,7 @@
 """The stop signal: whatever happens on the way, a machine runs only on a permission that is fresh and alive."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -79,6 +81,19 @@ def test_what_a_permission_took_to_arrive_is_taken_off_its_time(receiver):
     receiver.take(run_order(3), to_ns(0.3), 0)
     assert receiver.why_stop(to_ns(0.2)) == ""
     assert receiver.why_stop(to_ns(0.2) + 1) == "stop signal is silent"
+
+
+@pytest.mark.parametrize("valid_s", [0.0, -1.0, 5.1, math.inf, math.nan])
+def test_a_permission_for_no_time_or_for_ever_is_none(receiver, valid_s):
+    receiver.take(StopOrder(False, 3, valid_s, ""), 0, 1)
+    assert receiver.why_stop(1) == "told to stop"
+
+
+def test_after_the_clock_was_set_the_next_message_decides(receiver):
+    receiver.forget()
+    assert receiver.why_stop(0) == "clock was set"
+    receiver.take(run_order(3), 0, 1)
+    assert receiver.why_stop(1) == ""
 
 
 events = st.lists(
