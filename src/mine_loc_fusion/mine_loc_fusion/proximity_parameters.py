@@ -10,7 +10,7 @@ class ProximityParameters(NodeParameters):
     """People near machines. All hold from start to end: no alarm may be lost by a change."""
 
     danger_enter: float = parameter(
-        0.3,
+        0.1,
         "probability of being inside from which on somebody is in danger",
         unit="1",
         low=0.01,
@@ -18,13 +18,13 @@ class ProximityParameters(NodeParameters):
         read_only=True,
     )
     danger_leave: float = parameter(
-        0.05, "probability below which the danger may end", unit="1", low=0.0, high=0.99, read_only=True
+        0.02, "probability below which the danger may end", unit="1", low=0.0, high=0.99, read_only=True
     )
     danger_dwell_s: float = parameter(
         0.0, "a danger begins when danger_enter held for so long", unit="s", low=0.0, high=2.0, read_only=True
     )
     warning_enter: float = parameter(
-        0.3,
+        0.1,
         "probability of being inside from which on somebody is warned of",
         unit="1",
         low=0.01,
@@ -32,7 +32,7 @@ class ProximityParameters(NodeParameters):
         read_only=True,
     )
     warning_leave: float = parameter(
-        0.05, "probability below which the warning may end", unit="1", low=0.0, high=0.99, read_only=True
+        0.02, "probability below which the warning may end", unit="1", low=0.0, high=0.99, read_only=True
     )
     warning_dwell_s: float = parameter(
         0.0, "a warning begins when warning_enter held for so long", unit="s", low=0.0, high=5.0, read_only=True
