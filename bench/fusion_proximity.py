@@ -140,15 +140,15 @@ def judged(judge: Judge, those: Walks, sd_m: float) -> Array:
 
 def alarms(scores: Array, rule: Rule) -> Array:
     """Whether the alarm is on, (n, k): the rule of `mine_loc_fusion.presence`, for many walks at a time."""
-    on, held = np.zeros(len(scores), bool), np.zeros(len(scores), int)
+    on, since = np.zeros(len(scores), bool), np.full(len(scores), -1)
     dwell = np.ceil(np.array([rule.enter_dwell_s, rule.leave_dwell_s]) / LAW["period_s"] - 1e-9).astype(int)
     states = np.zeros(scores.shape, bool)
     for number, score in enumerate(scores.T):
         told = np.isfinite(score)
         asks = np.where(on, score <= rule.leave, score >= rule.enter)
-        held = np.where(told, np.where(asks, held + 1, 0), held)
-        change = told & (held > np.where(on, dwell[1], dwell[0]))
-        on, held = on ^ change, np.where(change, 0, held)
+        since = np.where(told, np.where(asks, np.where(since < 0, number, since), -1), since)
+        change = told & asks & (number - since >= np.where(on, dwell[1], dwell[0]))
+        on, since = on ^ change, np.where(change, -1, since)
         states[:, number] = on
     return states
 

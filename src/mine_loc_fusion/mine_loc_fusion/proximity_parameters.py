@@ -90,3 +90,12 @@ class RelayParameters(NodeParameters):
     timeout_s: float = parameter(
         0.3, "how long a device may take to answer", unit="s", low=0.05, high=2.0, read_only=True
     )
+
+
+@dataclass(frozen=True)
+class MarkersParameters(NodeParameters):
+    """The live map."""
+
+    period_s: float = parameter(
+        0.2, "how often people and vehicles are drawn", unit="s", low=0.05, high=0.9, read_only=True
+    )

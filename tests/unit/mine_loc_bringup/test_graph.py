@@ -36,6 +36,7 @@ def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_one_a_relay_
         "fusion",
         "proximity",
         "relay_shuttle_car",
+        "markers",
     ]
 
 
