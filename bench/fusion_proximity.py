@@ -9,7 +9,8 @@ anchors on the vehicle itself, where they push positions away from it and hardly
 Every method has the same rounds and as many bounds and dwells to choose from, on seeds of their own: that setting which
 raises the fewest false alarms of those that miss nobody and warn no later than a point in the zone by multilateration
 does without any hysteresis. `multilateration` and `weighted_lm_kf` judge the position alone, by its distance from the
-zone, which they may enlarge; `mine_loc` the probability of being inside, from the tracker's covariance.
+zone, which they may enlarge; `mine_loc` the probability of being inside, from the tracker's covariance, and
+`mine_loc_as_shipped` the same with the defaults of tracker and node, on which nothing was chosen here.
 """
 
 import itertools
@@ -26,6 +27,7 @@ from uwb_paper_c import GIVEN_SD_M, LAW, rounds_of
 from uwb_tracks import Array, MakeSolver
 
 from mine_loc_fusion.inside_probability import inside_probability
+from mine_loc_fusion.proximity_parameters import ProximityParameters
 from mine_loc_uwb.fix import FixStatus
 from mine_loc_uwb.least_squares import LeastSquares
 from mine_loc_uwb.measurements import Measurements
@@ -213,6 +215,12 @@ def proximity_rows(place: Place = "loading_place", channel: Channel = "spikes") 
         rule = options[name][-1]
         results[method] = score(alarms(judged(judges[name], scored, sd_m), rule), scored)
         rows[method] = _row(results[method]) | {"chosen": f"{name} {rule}".strip()}
+    p = ProximityParameters()
+    as_shipped = Rule(p.danger_enter, p.danger_leave, p.danger_dwell_s, p.leave_dwell_s)
+    results["mine_loc_as_shipped"] = score(
+        alarms(judged(by_probability(RobustTracker), scored, sd_m), as_shipped), scored
+    )
+    rows["mine_loc_as_shipped"] = _row(results["mine_loc_as_shipped"]) | {"chosen": str(as_shipped)}
     rows["false_alarms_over_multilateration"] = {
         method: result.false_alarms / max(results["multilateration"].false_alarms, 1)
         for method, result in results.items()

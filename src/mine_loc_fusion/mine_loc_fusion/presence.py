@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.stamps import to_ns
 
 
@@ -16,10 +15,6 @@ class PresenceRule:
     leave: float
     enter_dwell_s: float
     leave_dwell_s: float
-
-    def __post_init__(self) -> None:
-        if not self.leave < self.enter:
-            raise ConfigurationError(f"leave {self.leave:g} is not allowed; allowed: below enter, {self.enter:g}")
 
 
 class Presence:

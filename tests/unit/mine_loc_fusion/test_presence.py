@@ -2,11 +2,9 @@
 
 import itertools
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_fusion.presence import Presence, PresenceRule
 
@@ -69,8 +67,3 @@ def test_time_that_was_set_back_or_jumped_lets_the_count_begin_anew():
     presence.time_jumped()
     assert not presence.update(11 * NS_PER_S, 1.0)
     assert presence.update(12 * NS_PER_S, 1.0)
-
-
-def test_a_leave_bound_that_is_not_below_enter_is_refused():
-    with pytest.raises(ConfigurationError, match=r"leave 0\.5 is not allowed; allowed: below enter, 0\.5"):
-        PresenceRule(0.5, 0.5, 0.0, 0.0)

@@ -7,6 +7,7 @@ import numpy as np
 from geometry_msgs.msg import Pose
 from mine_loc_interfaces import msg
 
+from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
 from mine_loc_fusion.estimate import Mode
 from mine_loc_fusion.possible_presence import DoubtRule, SeenPerson
@@ -35,7 +36,14 @@ def to_pose2(pose: Pose) -> Pose2:
 
 
 def to_guard_rules(p: ProximityParameters) -> GuardRules:
-    """The rules that the parameters state."""
+    """The rules that the parameters state. Raises ConfigurationError where an alarm would end before it begins."""
+    for kind, enter, leave in (
+        ("warning", p.warning_enter, p.warning_leave),
+        ("danger", p.danger_enter, p.danger_leave),
+    ):
+        if leave >= enter:
+            allowed = f"below {kind}_enter, {enter:g}"
+            raise ConfigurationError(f"proximity: {kind}_leave: {leave:g} is not allowed; allowed: {allowed}")
     return GuardRules(
         ProximityRules(
             PresenceRule(p.warning_enter, p.warning_leave, p.warning_dwell_s, p.leave_dwell_s),
