@@ -56,7 +56,7 @@ def test_the_graph_stops_within_two_seconds_and_leaves_nobody_behind(number, tmp
 
 def test_the_graph_stops_within_two_seconds_while_it_is_starting(tmp_path, domain, observer):
     with running(up_command(write_live_site(tmp_path)), domain, tmp_path / "up.log") as up:
-        observer.wait_for(lambda: "[fusion] started" in up.output)
+        observer.wait_for(lambda: "[markers] started" in up.output)
         took_s = up.stop(signal.SIGINT)
         assert up.process.returncode == 0
         assert took_s < 2.0

@@ -50,9 +50,9 @@ def _from_polygon_m(polygon_m: Array, points_m: Array) -> Array:
     share = np.clip(np.sum(offset * edge, axis=2) / length_sq, 0.0, 1.0)
     distance_m = np.sqrt(np.min(np.sum((offset - share[..., None] * edge) ** 2, axis=2), axis=1))
     x, y = points_m[:, :1], points_m[:, 1:]
+    rise = end[:, 1] > start[:, 1]
     straddles = (start[:, 1] > y) != (end[:, 1] > y)
-    rise = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])  # a level edge straddles nothing
-    left = x < start[:, 0] + (y - start[:, 1]) / rise * edge[:, 0]
+    left = ((x - start[:, 0]) * edge[:, 1] < (y - start[:, 1]) * edge[:, 0]) == rise
     inside = np.sum(straddles & left, axis=1) % 2 == 1
     signed: Array = np.where(inside, -distance_m, distance_m)
     return signed

@@ -18,14 +18,14 @@ HALF_PLANE = ZoneShape(np.array([[0.0, -500.0], [1000.0, -500.0], [1000.0, 500.0
 def test_at_a_straight_border_it_is_the_normal_distribution(x, sd_x, sd_y, correlation):
     covariance = np.array([[sd_x**2, correlation * sd_x * sd_y], [correlation * sd_x * sd_y, sd_y**2]])
     found = inside_probability(HALF_PLANE, np.array([x, 0.0]), covariance)
-    assert found == pytest.approx(norm.cdf(x / sd_x), abs=0.006)
+    assert found == pytest.approx(norm.cdf(x / sd_x), abs=0.009)
 
 
 @pytest.mark.parametrize(("radius_m", "sd_m"), [(1.0, 0.5), (2.0, 2.0), (5.0, 4.0)])
 def test_of_a_disc_round_the_mean_it_is_the_rayleigh_distribution(radius_m, sd_m):
     point = ZoneShape(np.array([[0.0, 0.0], [1e-6, 0.0], [0.0, 1e-6]]), radius_m)
     found = inside_probability(point, np.zeros(2), sd_m**2 * np.eye(2))
-    assert found == pytest.approx(1.0 - math.exp(-0.5 * (radius_m / sd_m) ** 2), abs=0.006)
+    assert found == pytest.approx(1.0 - math.exp(-0.5 * (radius_m / sd_m) ** 2), abs=0.009)
 
 
 def test_of_a_vehicle_s_surroundings_it_is_what_sampling_finds():
@@ -33,7 +33,7 @@ def test_of_a_vehicle_s_surroundings_it_is_what_sampling_finds():
     mean, covariance = np.array([7.0, 4.0]), np.array([[2.0, 1.2], [1.2, 1.5]])
     drawn = np.random.default_rng(1).multivariate_normal(mean, covariance, 200_000)
     assert inside_probability(shape, mean, covariance) == pytest.approx(
-        np.mean(shape.signed_distance_m(drawn) <= 0.0), abs=0.006
+        np.mean(shape.signed_distance_m(drawn) <= 0.0), abs=0.009
     )
 
 
