@@ -23,6 +23,8 @@ def commands(folder) -> dict[str, list[str]]:
         "pdr": node_command("mine_loc_pdr.nodes.pdr", {"site": site}),
         "synchroniser": node_command("mine_loc_fusion.nodes.synchroniser", {"site": site}),
         "fusion": node_command("mine_loc_fusion.nodes.fusion", {"site": site}),
+        "proximity": node_command("mine_loc_fusion.nodes.proximity", {"site": site}),
+        "markers": node_command("mine_loc_fusion.nodes.markers", {"site": site}),
     }
 
 
