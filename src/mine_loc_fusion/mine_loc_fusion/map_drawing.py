@@ -9,7 +9,7 @@ import numpy as np
 
 from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.site import Gallery, Site
-from mine_loc_fusion.estimate import Mode
+from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.possible_presence import KNOWN_MODES, SeenPerson
 from mine_loc_fusion.proximity import Pose2, ProximityZone, placed_body
 from mine_loc_fusion.zone_shape import Array, ZoneShape

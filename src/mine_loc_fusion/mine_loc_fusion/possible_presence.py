@@ -7,7 +7,7 @@ import numpy as np
 
 from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import to_ns, to_s
-from mine_loc_fusion.estimate import Mode
+from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.zone_shape import Array, ZoneShape
 
 KNOWN_MODES = frozenset({Mode.UWB_PDR, Mode.UWB_ONLY, Mode.DEAD_RECKONING, Mode.COASTING})

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mine_loc_core.site import load_site
-from mine_loc_fusion.estimate import Mode
 from mine_loc_fusion.map_drawing import GREEN, RED, YELLOW, border, draw_person, draw_site, draw_vehicles, draw_zones
+from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.possible_presence import SeenPerson
 from mine_loc_fusion.proximity import Pose2
 from mine_loc_fusion.site_zones import proximity_zones

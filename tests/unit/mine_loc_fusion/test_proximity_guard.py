@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_core.stamps import NS_PER_S, to_ns
-from mine_loc_fusion.estimate import Mode
+from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.possible_presence import KNOWN_MODES, DoubtRule, SeenPerson
 from mine_loc_fusion.presence import PresenceRule
 from mine_loc_fusion.proximity import Pose2, ProximityRules, ProximityZone

@@ -9,7 +9,7 @@ from mine_loc_interfaces import msg
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
-from mine_loc_fusion.estimate import Mode
+from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.possible_presence import DoubtRule, SeenPerson
 from mine_loc_fusion.presence import PresenceRule
 from mine_loc_fusion.proximity import MOST_ALARMS, Alarm, Pose2, ProximityRules
