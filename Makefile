@@ -19,10 +19,10 @@ demo: setup      ## the live graph on a recording (RECORDING=m1l|isas_walk1|gene
 	    $(if $(SITE),--site "$(SITE)") --people "$(PEOPLE)"
 
 test: setup      ## all checks: style, types, unit, live graph and fault tests
-	@$(run) ruff format --check --quiet src tests bench && ruff check src tests bench && mypy && pytest
+	@$(run) ruff format --check --quiet src tests bench examples && ruff check src tests bench examples && mypy && pytest
 
 check: setup     ## style and types only
-	@$(run) ruff format --check --quiet src tests bench && ruff check src tests bench && mypy
+	@$(run) ruff format --check --quiet src tests bench examples && ruff check src tests bench examples && mypy
 
 nightly: setup   ## ten million random bytes for the decoders, ten minutes of ten simulated people
 	@$(run) MINE_LOC_FUZZ_BYTES=10000000 pytest tests/fuzz

@@ -23,8 +23,9 @@ import yaml
 from scipy.optimize import least_squares as scipy_least_squares
 from uwb_tracks import Array, MakeSolver, measurements_of, run_solver, spread
 
-from mine_loc_core.site import load_site
+from mine_loc_core.site import Site, load_site
 from mine_loc_core.verdicts import Reason
+from mine_loc_sim.mine import Mine
 from mine_loc_sim.radio_constants import INDUSTRIAL
 from mine_loc_sim.range_law import FastTagLinks
 from mine_loc_sim.ranging_link import Radios
@@ -84,9 +85,14 @@ def walk() -> tuple[Array, Array]:
 
 def spikes(seed: int, share: float = LAW["spike_share"]) -> Run:
     """Independent spikes on some ranges."""
-    rng = np.random.default_rng(seed)
-    truth_m, _ = walk()
-    distance_m = np.linalg.norm(_at_height(truth_m)[:, None] - ANCHORS_M, axis=2)
+    return with_spikes(walk()[0], np.random.default_rng(seed), share)
+
+
+def with_spikes(
+    truth_m: Array, rng: np.random.Generator, share: float = LAW["spike_share"], anchors_m: Array = ANCHORS_M
+) -> Run:
+    """Ranges at places (n, 2) with independent spikes."""
+    distance_m = np.linalg.norm(_at_height(truth_m)[:, None] - anchors_m, axis=2)
     law = LAW["spike_gamma"]
     hit = rng.random(distance_m.shape) < share
     late_m = hit * rng.gamma(law["shape"], law["scale_m"], distance_m.shape)
@@ -97,19 +103,31 @@ def spikes(seed: int, share: float = LAW["spike_share"]) -> Run:
 @cache
 def obstacles(seed: int) -> Run:
     """Ranges through the simulator's channel."""
-    rng = np.random.default_rng(seed)
-    truth_m, course = walk()
-    tag_m = _at_height(truth_m)
-    vehicle = SITE.vehicles[0]
-    mine = mine_of(SITE).with_obstacles([vehicle_prism(vehicle, *vehicle.position_m, vehicle.yaw_rad)])
-    ways = mine.look(np.repeat(tag_m, len(ANCHORS_M), axis=0), np.tile(ANCHORS_M, (len(tag_m), 1)))
-    radios = Radios.draw(len(ANCHORS_M), rng)
+    return through_channel(*walk(), np.random.default_rng(seed))
+
+
+def through_channel(truth_m: Array, course: Array, rng: np.random.Generator, site: Site = SITE) -> Run:
+    """Ranges through the simulator's channel at places (n, 2), the person facing along `course` (n,)."""
+    tag_m, anchors_m, mine = _at_height(truth_m), anchors_of(site), _mine_with_vehicle(site)
+    ways = mine.look(np.repeat(tag_m, len(anchors_m), axis=0), np.tile(anchors_m, (len(tag_m), 1)))
+    radios = Radios.draw(len(anchors_m), rng)
     links = FastTagLinks(INDUSTRIAL, Radios.draw(1, rng), radios, Wearer.draw(rng), rng)
-    which = np.tile(np.arange(len(ANCHORS_M)), (len(tag_m), 1))
-    ranges = links.measure(tag_m, course, ANCHORS_M[which], which, ways)
+    which = np.tile(np.arange(len(anchors_m)), (len(tag_m), 1))
+    ranges = links.measure(tag_m, course, anchors_m[which], which, ways)
     powers = zip(ranges.first_path_power_dbm.tolist(), ranges.receive_power_dbm.tolist(), strict=True)
     told = np.array([odds_of_power_rule(los_probability_from_powers(*each)) for each in powers])
     return Run(truth_m, ranges.range_m.reshape(which.shape), told.reshape(which.shape))
+
+
+def anchors_of(site: Site) -> Array:
+    """Places of the anchors (n, 3)."""
+    return np.array([anchor.position_m for anchor in site.anchors])
+
+
+@cache
+def _mine_with_vehicle(site: Site) -> Mine:
+    vehicle = site.vehicles[0]
+    return mine_of(site).with_obstacles([vehicle_prism(vehicle, *vehicle.position_m, vehicle.yaw_rad)])
 
 
 def _at_height(truth_m: Array) -> Array:
@@ -141,11 +159,11 @@ def residuals(position: Array, measurements: Measurements) -> Array:
     return np.asarray(np.linalg.norm(offset, axis=1) - measurements.range_m)
 
 
-def rounds_of(run: Run, sd_m: float) -> list[Measurements]:
+def rounds_of(run: Run, sd_m: float, anchors_m: Array = ANCHORS_M) -> list[Measurements]:
     """Rounds at the paper's period, the first at 1 s."""
     height_m = SITE.tag_height_m
     return [
-        measurements_of(_time_s(number), ANCHORS_M, row, sd_m=sd_m, height_m=height_m, los_probability=told)
+        measurements_of(_time_s(number), anchors_m, row, sd_m=sd_m, height_m=height_m, los_probability=told)
         for number, (row, told) in enumerate(zip(run.range_m, run.los_probability, strict=True))
     ]
 

@@ -16,6 +16,8 @@ NODES = {
     "pdr": "mine_loc_pdr.nodes.pdr",
     "synchroniser": "mine_loc_fusion.nodes.synchroniser",
     "fusion": "mine_loc_fusion.nodes.fusion",
+    "proximity": "mine_loc_fusion.nodes.proximity",
+    "relay": "mine_loc_fusion.nodes.relay",
 }
 
 
@@ -50,6 +52,9 @@ def words_of(command: list[str], domain: int, log: Path) -> list[str]:
         ("pdr", "odometry_rate", "0.0", "Hz"),
         ("synchroniser", "history_s", "1000.0", "0.1 to 30 s"),
         ("fusion", "gate_probability", "1.5", "0.5 to 0.999999"),
+        ("proximity", "valid_for_s", "60.0", "0.1 to 5 s"),
+        ("proximity", "danger_leave", "0.5", "below danger_enter"),
+        ("relay", "relay", "nobody", "no relay of this site"),
     ],
 )
 def test_an_impossible_parameter_is_refused_in_one_line(node, key, value, allowed, site, domain, tmp_path):

@@ -10,7 +10,17 @@ from graph.observer import Observer
 from graph.processes import Running, running, up_command
 from graph.walker import VISITOR_TAG, WALKER_TAG, LiveWalker, live_walker, person, write_site
 
-NODES = ("dwm1000_driver_gate", "los_classifier", "uwb_solver", "n100_driver", "pdr", "synchroniser", "fusion")
+NODES = (
+    "dwm1000_driver_gate",
+    "los_classifier",
+    "uwb_solver",
+    "n100_driver",
+    "pdr",
+    "synchroniser",
+    "fusion",
+    "proximity",
+    "markers",
+)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ def commands(folder) -> dict[str, list[str]]:
         "pdr": node_command("mine_loc_pdr.nodes.pdr", {"site": site}),
         "synchroniser": node_command("mine_loc_fusion.nodes.synchroniser", {"site": site}),
         "fusion": node_command("mine_loc_fusion.nodes.fusion", {"site": site}),
+        "proximity": node_command("mine_loc_fusion.nodes.proximity", {"site": site}),
+        "markers": node_command("mine_loc_fusion.nodes.markers", {"site": site}),
     }
 
 
@@ -56,7 +58,7 @@ def test_the_graph_stops_within_two_seconds_and_leaves_nobody_behind(number, tmp
 
 def test_the_graph_stops_within_two_seconds_while_it_is_starting(tmp_path, domain, observer):
     with running(up_command(write_live_site(tmp_path)), domain, tmp_path / "up.log") as up:
-        observer.wait_for(lambda: "[fusion] started" in up.output)
+        observer.wait_for(lambda: "[markers] started" in up.output)
         took_s = up.stop(signal.SIGINT)
         assert up.process.returncode == 0
         assert took_s < 2.0

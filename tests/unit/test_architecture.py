@@ -30,6 +30,7 @@ ROSDEP = {  # import name → rosdep key
     "yaml": "python3-yaml",
     "jsonschema": "python3-jsonschema",
     "serial": "python3-serial",
+    "pymodbus": "python3-pymodbus",
     "psutil": "python3-psutil",
     "rich": "python3-rich",
     "matplotlib": "python3-matplotlib",

@@ -20,6 +20,7 @@ _MODULES = {  # import name → (name on PyPI, package of Debian and Ubuntu)
     "yaml": ("PyYAML", "python3-yaml"),
     "jsonschema": ("jsonschema", "python3-jsonschema"),
     "serial": ("pyserial", "python3-serial"),
+    "pymodbus": ("pymodbus", "python3-pymodbus"),
     "rich": ("rich", "python3-rich"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "rosbags": ("rosbags", ""),

@@ -29,7 +29,7 @@ class NodeSpec:
 
     key: str
     package: str
-    per: Literal["site", "person_with_n100", "uwb_receiver"]
+    per: Literal["site", "person_with_n100", "uwb_receiver", "relay"]
     parameter_class: str
     name: str
     namespace: str = "/"
@@ -132,6 +132,8 @@ def _scopes(spec: NodeSpec, site: Site, people: People) -> Iterator[dict[str, An
         yield {"site": site}
     elif spec.per == "uwb_receiver":
         yield from ({"site": site, "receiver": receiver} for receiver in site.uwb_receivers)
+    elif spec.per == "relay":
+        yield from ({"site": site, "relay": relay} for relay in site.relays)
     else:
         yield from ({"site": site, "person": person} for person in people if person.n100)
 

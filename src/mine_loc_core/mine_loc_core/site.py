@@ -18,6 +18,7 @@ from mine_loc_core.yaml_source import load_yaml, refuse
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 Material = Literal["rock", "steel", "concrete", "wood", "water"]
+RelayOutput = Literal["modbus_tcp", "modbus_rtu", "dtr", "rts"]
 WireFormat = Literal["auto", "trek1000", "dwm1001_shell", "dwm1001_tlv", "arduino", "nlink", "mine_loc"]
 
 
@@ -77,13 +78,17 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A box on wheels. Its frame (FLU) has the origin on the floor below its middle, at first at `position_m`."""
+    """A box on wheels. Its frame (FLU) has the origin on the floor below its middle, at first at `position_m`.
+
+    One that `stands` never leaves that place; any other tells its pose.
+    """
 
     id: str
     size_m: Point3
     position_m: Point3
     yaw_rad: float
     anchor_ids: tuple[int, ...]
+    stands: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +103,19 @@ class TurnMarker:
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """An area whose entering and leaving is reported."""
+    """An area whose entering and leaving is reported.
+
+    One that a `vehicle` carries has its corners in that vehicle's frame, without corners those of the vehicle's body.
+    Within `warning_m` and `danger_m` of it people are warned of, and in danger; None = no such distance.
+    """
 
     id: str
     name: str
     type: ZoneType
     polygon_m: tuple[Point2, ...]
+    vehicle: str | None = None
+    warning_m: float | None = None
+    danger_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +139,19 @@ class UwbReceiver:
     baud: int
     anchor_id: int | None = None
     tag_id: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Relay:
+    """Outputs that hold a vehicle: energised while it may run, on a Modbus device or a serial port's control line."""
+
+    name: str
+    vehicle: str
+    output: RelayOutput
+    port: str
+    baud: int
+    unit: int
+    coils: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +179,7 @@ class Site:
     zones: tuple[Zone, ...] = ()
     monitors: tuple[Monitor, ...] = ()
     uwb_receivers: tuple[UwbReceiver, ...] = ()
+    relays: tuple[Relay, ...] = ()
     discovery: Discovery = Discovery()
 
 
@@ -187,12 +213,10 @@ def _site(content: Mapping[str, Any]) -> Site:
         obstacles=every("obstacles", lambda o: Obstacle(o["id"], *_prism(o), o["material"])),
         vehicles=every("vehicles", _vehicle),
         turn_markers=every("turn_markers", _turn_marker),
-        zones=every(
-            "zones",
-            lambda z: Zone(z["id"], z.get("name", z["id"]), ZoneType[z["type"].upper()], _points(z["polygon_m"])),
-        ),
+        zones=every("zones", _zone),
         monitors=every("monitors", lambda m: Monitor(m["id"], _point(m["position_m"]))),
         uwb_receivers=every("uwb_receivers", _uwb_receiver),
+        relays=every("relays", _relay),
         discovery=Discovery(discovery.get("range", "localhost"), tuple(discovery.get("peers", []))),
     )
 
@@ -226,7 +250,14 @@ def _vehicle(item: Mapping[str, Any]) -> Vehicle:
         position_m=_point(item.get("position_m", [0, 0, 0])),
         yaw_rad=math.radians(item.get("yaw_deg", 0.0)),
         anchor_ids=tuple(device_id(anchor) for anchor in item.get("anchors", [])),
+        stands=item.get("stands", False),
     )
+
+
+def _zone(item: Mapping[str, Any]) -> Zone:
+    distances = [float(item[key]) if key in item else None for key in ("warning_m", "danger_m")]
+    corners, kind = _points(item.get("polygon_m", [])), ZoneType[item["type"].upper()]
+    return Zone(item["id"], item.get("name", item["id"]), kind, corners, item.get("vehicle"), *distances)
 
 
 def _turn_marker(item: Mapping[str, Any]) -> TurnMarker:
@@ -238,3 +269,10 @@ def _uwb_receiver(item: Mapping[str, Any]) -> UwbReceiver:
     anchor = device_id(item["anchor"]) if "anchor" in item else None
     tag = device_id(item["tag"]) if "tag" in item else 0
     return UwbReceiver(item["name"], item["port"], item.get("format", "auto"), item.get("baud", 115200), anchor, tag)
+
+
+def _relay(item: Mapping[str, Any]) -> Relay:
+    coils = tuple(item.get("coils", [0]))
+    return Relay(
+        item["name"], item["vehicle"], item["output"], item["port"], item.get("baud", 9600), item.get("unit", 1), coils
+    )

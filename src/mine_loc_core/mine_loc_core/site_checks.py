@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mine_loc_core.site_checks_proximity import relay_contradictions, zone_contradictions
 from mine_loc_core.yaml_schema import device_id, twice
 from mine_loc_core.yaml_source import KeyPath, YamlSource
 
@@ -20,7 +21,10 @@ def contradictions(source: YamlSource) -> Iterator[str]:
         yield from twice(source, section, ("id",), device_id if section == "anchors" else str)
     yield from twice(source, "uwb_receivers", ("name",))
     yield from twice(source, "uwb_receivers", ("port",))
+    yield from twice(source, "relays", ("name",))
     yield from _unknown_anchors(source)
+    yield from zone_contradictions(source)
+    yield from relay_contradictions(source)
     for index, gallery in enumerate(content.get("galleries", [])):
         line = gallery["centre_line_m"]
         if sum(math.dist(a, b) for a, b in itertools.pairwise(line)) == 0:
@@ -29,7 +33,7 @@ def contradictions(source: YamlSource) -> Iterator[str]:
             )
     for section in ("chambers", "obstacles", "zones"):
         for index, item in enumerate(content.get(section, [])):
-            if _area_m2(item["polygon_m"]) == 0:
+            if "polygon_m" in item and _area_m2(item["polygon_m"]) == 0:
                 yield source.problem((section, index, "polygon_m"), "has area 0; allowed: corners that enclose an area")
     yield from _misplaced_anchors(source)
 

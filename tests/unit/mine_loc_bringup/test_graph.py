@@ -23,7 +23,7 @@ def node(name: str, **options) -> NodeProcess:
     return next(process for process in expand(SITE, PEOPLE, FOLDER, **options) if process.name == name)
 
 
-def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_and_one_of_each_else():
+def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_one_a_relay_and_one_of_each_else():
     assert [process.name for process in expand(SITE, PEOPLE, FOLDER)] == [
         "dwm1000_driver_portal",
         "dwm1000_driver_junction",
@@ -34,7 +34,14 @@ def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_and_one_of_e
         "pdr",
         "synchroniser",
         "fusion",
+        "proximity",
+        "relay_shuttle_car",
+        "markers",
     ]
+
+
+def test_a_relay_s_node_is_told_which_one_it_is():
+    assert node("relay_shuttle_car").parameters == {"site": str(FOLDER), "relay": "shuttle_car"}
 
 
 def test_a_receiver_s_driver_is_told_its_line():
