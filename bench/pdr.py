@@ -1,12 +1,13 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap streams]
 
 Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); docs/pdr.md
 explains the rows.
 """
 
 import argparse
+import itertools
 import json
 import os
 import sys
@@ -22,6 +23,7 @@ import pdr_distance
 import pdr_heading
 import pdr_recordings
 import pdr_steps
+import pdr_streams
 from pdr_tracks import track
 from rich.console import Console
 from rich.table import Column, Table
@@ -50,7 +52,17 @@ def mobgap() -> dict[str, Any]:
     return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
 
 
-PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {"ipol": ipol, "oxford": oxford, "mobgap": mobgap}
+def streams() -> dict[str, Any]:
+    """How many people one core carries."""
+    return pdr_streams.streams(list(itertools.islice(pdr_recordings.ipol(), 8)))
+
+
+PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "ipol": ipol,
+    "oxford": oxford,
+    "mobgap": mobgap,
+    "streams": streams,
+}
 
 
 def table(figures: Mapping[str, Any]) -> Table:

@@ -17,13 +17,14 @@ from tf2_msgs.msg import TFMessage
 
 from mine_loc_core import quaternion
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.stamps import NS_PER_S
-from mine_loc_pdr.dead_reckoning import ImuSample, OdometryPose, PedestrianDeadReckoning, StepEvent
+from mine_loc_pdr.dead_reckoning import OdometryPose, PedestrianDeadReckoning, StepEvent
 from mine_loc_pdr.parameters import PdrParameters
+from mine_loc_pdr.sensor_cdr import imu_sample
 from mine_loc_pdr.stride import stride_model
 
 _PEOPLE_PERIOD_S = 1.0
@@ -101,19 +102,18 @@ class Pdr(NodeBase):
         track = Track(person, n100)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
         track.subscription = self.subscribe(
-            Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM
+            Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM, raw=True
         )
         return track
 
-    def _on_imu(self, track: Track, message: Imu) -> None:
-        rate, force = message.angular_velocity, message.linear_acceleration
-        stamp_ns = to_stamp_ns(message.header.stamp)
-        step = track.pdr.push(ImuSample(stamp_ns, (rate.x, rate.y, rate.z), (force.x, force.y, force.z)))
+    def _on_imu(self, track: Track, message: bytes) -> None:
+        sample = imu_sample(message)
+        step = track.pdr.push(sample)
         track.samples += 1
         track.heard_s = time.monotonic()
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
-        period = stamp_ns // self._period_ns
+        period = sample.stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
             self._publish_pose(track, pose)
