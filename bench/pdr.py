@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import pdr_distance
 import pdr_heading
+import pdr_mounting
 import pdr_recordings
 import pdr_steps
 import pdr_streams
@@ -37,7 +38,8 @@ def ipol() -> dict[str, Any]:
     tracks = [track(recording) for recording in recordings]
     distance, stretch = pdr_distance.ipol(recordings)
     heading = pdr_heading.ipol(recordings, tracks, stretch)
-    return {"steps": pdr_steps.ipol(recordings, tracks), "heading": heading, "distance": distance}
+    steps, mounting = pdr_steps.ipol(recordings, tracks), pdr_mounting.ipol(recordings)
+    return {"steps": steps, "heading": heading, "distance": distance, "mounting": mounting}
 
 
 def oxford() -> dict[str, Any]:

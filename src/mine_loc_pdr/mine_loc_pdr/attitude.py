@@ -25,17 +25,19 @@ class AttitudeFilter:
     the body levelled, its x axis the horizontal part of `forward_imu`. Where that points up or down, because the
     stated mounting is wrong, facing is off by a constant, which the alignment of odom with the map takes up.
 
-    Vectors are in the IMU's axes, forward-left-up by convention.
+    Vectors are in the IMU's axes, forward-left-up by convention. `forward_imu` is the level front of the body in them,
+    `start_imu` the attitude at the start, base_link←imu by what was supposed of the mounting.
     """
 
     def __init__(self, force_m_s2: Vector3, forward_imu: Vector3 = (1.0, 0.0, 0.0)) -> None:
         """Start upright by gravity, from a specific force averaged over a moment; raises ValueError if it is zero."""
         self._q = _levelling(force_m_s2)
-        self._forward_imu = forward_imu
+        self.forward_imu = forward_imu
         east, north = self.facing
         if math.hypot(east, north) > _SMALLEST_FORWARD:
-            self._q = _turned_about_up(self._q, -math.atan2(north, east))
-        self._forward_imu = _row_x(self._q)
+            self._q = turned_about_up(self._q, -math.atan2(north, east))
+        self.forward_imu = _row_x(self._q)
+        self.start_imu = self._q
         self.bias_rad_s: Vector3 = (0.0, 0.0, 0.0)
 
     def update(self, dt_s: float, rate_rad_s: Vector3, force_m_s2: Vector3) -> None:
@@ -69,7 +71,7 @@ class AttitudeFilter:
     def facing(self) -> tuple[float, float]:
         """Where base_link's x axis points, as east-like and north-like components in odom."""
         w, x, y, z = self._q
-        fx, fy, fz = self._forward_imu
+        fx, fy, fz = self.forward_imu
         return (
             (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy + 2.0 * (x * z + w * y) * fz,
             2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy + 2.0 * (y * z - w * x) * fz,
@@ -110,7 +112,8 @@ def _levelling(force: Vector3) -> Quaternion:
     return 0.5 * n, y / n, -x / n, 0.0
 
 
-def _turned_about_up(q: Quaternion, angle_rad: float) -> Quaternion:
+def turned_about_up(q: Quaternion, angle_rad: float) -> Quaternion:
+    """`q` turned about odom's z axis, counter-clockwise."""
     c, s = math.cos(0.5 * angle_rad), math.sin(0.5 * angle_rad)
     w, x, y, z = q
     return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w

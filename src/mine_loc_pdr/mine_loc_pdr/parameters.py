@@ -29,4 +29,9 @@ class N100DriverParameters(NodeParameters):
 class PdrParameters(NodeParameters):
     """Parameters of `pdr`."""
 
+    mounting: str = parameter(
+        "walking",
+        "yaw of base_link to imu_link: as found from walking, or as people.yaml states (mounting_rpy_deg)",
+        choices=("walking", "stated"),
+    )
     odometry_rate: float = parameter(10.0, "of <person>/odometry and /tf", unit="Hz", low=0.1, high=200.0)

@@ -19,7 +19,7 @@ from mine_loc_core import quaternion
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_point, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
-from mine_loc_core.nodes.qos import EVENTS, STREAM
+from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_pdr.dead_reckoning import OdometryPose, PedestrianDeadReckoning, StepEvent
@@ -28,6 +28,9 @@ from mine_loc_pdr.sensor_cdr import imu_sample
 from mine_loc_pdr.stride import stride_model
 
 _PEOPLE_PERIOD_S = 1.0
+_MOUNTING_PERIOD_S = 1.0
+_MOUNTING_MOVED_RAD = math.radians(5.0)  # a transform said to be static is not sent anew for less
+_WRONG_FRONT_RAD = math.radians(30.0)
 _SILENT_S = 1.0
 _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says nothing about them
 
@@ -50,6 +53,7 @@ class Track:
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
         self.pdr = PedestrianDeadReckoning(stride_model(self.person), (float(x), float(y), float(z)))
         self.published_period = 0
+        self.mounting_yaw_rad: float | None = None  # as last published
         self.samples = 0
 
 
@@ -67,9 +71,11 @@ class Pdr(NodeBase):
         self._file = PeopleFile(Path(self.parameters.site))
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
+        self._tf_static = self.publish_to(TFMessage, "/tf_static", LATCHED)
         self._follow(self._file.people)
         self.parameters_changed()
         self.every(_PEOPLE_PERIOD_S, self._poll_people)
+        self.every(_MOUNTING_PERIOD_S, self._publish_mountings)
         self.serve(Reset, "~/reset", self._reset)
 
     def parameters_changed(self) -> None:
@@ -133,6 +139,31 @@ class Pdr(NodeBase):
         transform.transform.rotation = body.orientation
         self._tf.publish(TFMessage(transforms=[transform]))
 
+    def _publish_mountings(self) -> None:
+        """Where the sensors sit, all in one message, since the last one is all that a latecomer gets."""
+        found = {name: yaw for name, track in self._tracks.items() if (yaw := self._mounting_yaw(track)) is not None}
+        moved = [name for name, yaw in found.items() if _differs(yaw, self._tracks[name].mounting_yaw_rad)]
+        if not moved:
+            return
+        for name in moved:
+            self._tracks[name].mounting_yaw_rad = found[name]
+        tracks = [track for track in self._tracks.values() if track.mounting_yaw_rad is not None]
+        self._tf_static.publish(TFMessage(transforms=[self._mounting(track) for track in tracks]))
+
+    def _mounting_yaw(self, track: Track) -> float | None:
+        """Yaw of the front beside the supposed one; None while it is not known."""
+        if self.parameters.mounting == "stated":
+            return None if track.pdr.pose() is None else 0.0
+        return front.yaw_rad if (front := track.pdr.front) else None
+
+    def _mounting(self, track: Track) -> TransformStamped:
+        name = track.person.name
+        transform = TransformStamped(child_frame_id=f"{name}/imu_link")
+        transform.header = Header(stamp=to_time(self.now_ns()), frame_id=f"{name}/base_link")
+        q = transform.transform.rotation
+        q.w, q.x, q.y, q.z = track.pdr.mounting(track.mounting_yaw_rad)
+        return transform
+
     def _reset(self, request: Any) -> tuple[bool, str]:
         if request.person and request.person not in self._tracks:
             return False, f"{request.person}: wears no N100; known: {', '.join(self._tracks) or 'nobody'}"
@@ -150,10 +181,17 @@ class Pdr(NodeBase):
         if pose is not None:
             values["heading_sd_deg"] = f"{math.degrees(math.sqrt(pose.covariance[2, 2])):.1f}"
             values["gyro_bias_sd_deg_s"] = f"{math.degrees(pdr.bias_sd_rad_s):.3f}"
+        front = pdr.front
+        if front is not None:
+            values["front_yaw_deg"] = f"{math.degrees(front.yaw_rad):.0f}"
+            values["front_yaw_sd_deg"] = f"{math.degrees(math.sqrt(front.variance_rad2)):.0f}"
         if silent_s > _SILENT_S:
             return Health(name, Level.ERROR, f"no samples for {silent_s:.1f} s", values)
         if new_faults:
             return Health(name, Level.WARN, f"{new_faults} unusable samples or gaps in the last second", values)
+        if self.parameters.mounting == "stated" and front is not None and abs(front.yaw_rad) > _WRONG_FRONT_RAD:
+            beside = f"walks {math.degrees(front.yaw_rad):.0f}° beside the front that mounting_rpy_deg states"
+            return Health(name, Level.WARN, beside, values)
         return Health(name, Level.OK, "tracking" if pose is not None else "finding the horizon", values)
 
 
@@ -170,6 +208,10 @@ def _step(person: str, step: StepEvent) -> Step:
         position=to_point((step.x_m, step.y_m, 0.0)),
         confidence=step.confidence,
     )
+
+
+def _differs(yaw_rad: float, published_rad: float | None) -> bool:
+    return published_rad is None or abs(math.remainder(yaw_rad - published_rad, math.tau)) > _MOUNTING_MOVED_RAD
 
 
 def _covariance(pose: OdometryPose) -> list[float]:
