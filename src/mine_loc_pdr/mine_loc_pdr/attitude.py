@@ -56,6 +56,13 @@ class AttitudeFilter:
             (rate_rad_s[2] - bz + gain * (fx * uy - fy * ux)) * dt_s,
         )
 
+    def correct(self, heading_rad: float, bias_rad_s: float) -> None:
+        """Add to the heading, and to the gyro's bias about the vertical."""
+        ux, uy, uz = self.up_imu
+        bx, by, bz = self.bias_rad_s
+        self.bias_rad_s = (bx + bias_rad_s * ux, by + bias_rad_s * uy, bz + bias_rad_s * uz)
+        self._q = turned_about_up(self._q, heading_rad)
+
     @property
     def orientation_imu(self) -> Quaternion:
         """odom←imu, unit, w x y z."""
@@ -70,18 +77,25 @@ class AttitudeFilter:
     @property
     def facing(self) -> tuple[float, float]:
         """Where base_link's x axis points, as east-like and north-like components in odom."""
-        w, x, y, z = self._q
-        fx, fy, fz = self.forward_imu
-        return (
-            (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy + 2.0 * (x * z + w * y) * fz,
-            2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy + 2.0 * (y * z - w * x) * fz,
-        )
+        x, y, _ = rotated(self._q, self.forward_imu)
+        return x, y
 
     @property
     def heading_rad(self) -> float:
         """Yaw of base_link in odom, -π..π, counter-clockwise."""
         x, y = self.facing
         return math.atan2(y, x)
+
+
+def rotated(q: Quaternion, v: Vector3) -> Vector3:
+    """The coordinates in A of a vector in B, where `q` is A←B."""
+    w, x, y, z = q
+    vx, vy, vz = v
+    return (
+        (1.0 - 2.0 * (y * y + z * z)) * vx + 2.0 * (x * y - w * z) * vy + 2.0 * (x * z + w * y) * vz,
+        2.0 * (x * y + w * z) * vx + (1.0 - 2.0 * (x * x + z * z)) * vy + 2.0 * (y * z - w * x) * vz,
+        2.0 * (x * z - w * y) * vx + 2.0 * (y * z + w * x) * vy + (1.0 - 2.0 * (x * x + y * y)) * vz,
+    )
 
 
 def turned(q: Quaternion, vx: float, vy: float, vz: float) -> Quaternion:

@@ -18,9 +18,11 @@ from mine_loc_pdr.attitude import (
     AttitudeFilter,
     Quaternion,
     Vector3,
+    rotated,
     turned_about_up,
 )
 from mine_loc_pdr.drift import BIAS, HEADING, DriftModel, X, Y
+from mine_loc_pdr.magnetic_heading import MagneticHeading
 from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
 from mine_loc_pdr.rest import RestDetector
 from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, Step, StepDetector, StepThresholds
@@ -46,6 +48,14 @@ class ImuSample:
     stamp_ns: int
     rate_rad_s: Vector3
     force_m_s2: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSample:
+    """Magnetic field in tesla in the IMU's axes at stamp_ns."""
+
+    stamp_ns: int
+    field_t: Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +113,8 @@ class PedestrianDeadReckoning:
         self._front = FrontFinder()
         self._step_heading_rad = 0.0
         self._interval_before_s: float | None = None
-        self._x_m = self._y_m = 0.0
+        self._x_m = self._y_m = self._way_m = 0.0
+        self.magnetic = MagneticHeading()
         self.step_count = 0
         self.faults: Counter[str] = Counter()
 
@@ -122,6 +133,24 @@ class PedestrianDeadReckoning:
             return None
         self._last = sample
         return self._advance(attitude, last, sample, to_s(dt_ns))
+
+    def push_field(self, sample: FieldSample) -> None:
+        """Take a sample of the magnetic field, which corrects the heading where it can be trusted.
+
+        It is judged with the attitude at its stamp; one that comes before the attitude, or more than MOTION_SPAN_NS
+        after it, is left out.
+        """
+        attitude = self._attitude
+        if attitude is None or not all(map(math.isfinite, sample.field_t)):
+            return
+        orientation = next((q for stamp_ns, q, _ in reversed(self._motion) if stamp_ns <= sample.stamp_ns), None)
+        if orientation is None:
+            return
+        self._carry_drift()
+        field_odom_t = rotated(orientation, sample.field_t)
+        learnt = self.magnetic.push(sample.stamp_ns, self._way_m, field_odom_t, attitude.heading_rad, self._drift)
+        if learnt is not None:
+            attitude.correct(*learnt)
 
     def pose(self) -> OdometryPose | None:
         """The pose at the last sample, None before the horizon is found."""
@@ -182,6 +211,7 @@ class PedestrianDeadReckoning:
         self._detector.reset()
         self._rest.reset()
         self._motion.clear()
+        self.magnetic.interrupted()
         self._interval_before_s = None
 
     def _advance(self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float) -> StepEvent | None:
@@ -222,6 +252,7 @@ class PedestrianDeadReckoning:
         self._drift.step(dx_m, dy_m, self._stride.scale, along_sd_m, length_m * DIRECTION_SD_RAD)
         self._x_m += dx_m
         self._y_m += dy_m
+        self._way_m += length_m
         self.step_count += 1
         return StepEvent(
             step.stamp_ns,

@@ -9,7 +9,7 @@ import struct
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_pdr.attitude import Vector3
-from mine_loc_pdr.dead_reckoning import ImuSample
+from mine_loc_pdr.dead_reckoning import FieldSample, ImuSample
 
 _ENCODINGS = {b"\x00\x00": ">", b"\x00\x01": "<"}  # CDR, big and little endian
 _BODY_AT = 4
@@ -23,6 +23,12 @@ def imu_sample(message: bytes) -> ImuSample:
     """Stamp, angular velocity and linear acceleration of a sensor_msgs/Imu; raises ValueError if it is none."""
     stamp_ns, order, at = _header(message)
     return ImuSample(stamp_ns, _vector(message, order, at + _RATE_AT), _vector(message, order, at + _FORCE_AT))
+
+
+def field_sample(message: bytes) -> FieldSample:
+    """Stamp and magnetic field of a sensor_msgs/MagneticField; raises ValueError if it is none."""
+    stamp_ns, order, at = _header(message)
+    return FieldSample(stamp_ns, _vector(message, order, at))
 
 
 def _header(message: bytes) -> tuple[int, str, int]:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mine_loc_pdr.dead_reckoning import ImuSample
-from mine_loc_pdr.sensor_cdr import imu_sample
+from mine_loc_pdr.dead_reckoning import FieldSample, ImuSample
+from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
 
 serialization = pytest.importorskip("rclpy.serialization")
 messages = pytest.importorskip("sensor_msgs.msg")
@@ -30,6 +30,15 @@ def imu_message(frame, stamp, rate, force):
 def test_stamp_rate_and_force_are_those_of_the_message_whatever_its_frame_is_called(frame, stamp, rate, force):
     sample = imu_sample(imu_message(frame, stamp, rate, force))
     assert sample == ImuSample(stamp[0] * 10**9 + stamp[1], rate, force)
+
+
+@given(frames, vectors)
+def test_the_field_is_that_of_the_message(frame, field):
+    message = messages.MagneticField()
+    message.header.frame_id = frame
+    message.header.stamp.sec = 3
+    message.magnetic_field.x, message.magnetic_field.y, message.magnetic_field.z = field
+    assert field_sample(serialization.serialize_message(message)) == FieldSample(3 * 10**9, field)
 
 
 def test_a_big_endian_writer_is_understood():

@@ -11,7 +11,7 @@ from geometry_msgs.msg import TransformStamped
 from mine_loc_interfaces.msg import Step
 from mine_loc_interfaces.srv import Reset
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, MagneticField
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -24,7 +24,7 @@ from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_pdr.dead_reckoning import OdometryPose, PedestrianDeadReckoning, StepEvent
 from mine_loc_pdr.parameters import PdrParameters
-from mine_loc_pdr.sensor_cdr import imu_sample
+from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
 from mine_loc_pdr.stride import stride_model
 
 _PEOPLE_PERIOD_S = 1.0
@@ -41,9 +41,10 @@ class Track:
     def __init__(self, person: Person, n100: N100) -> None:
         self.person = person
         self._n100 = n100
-        self.subscription: Any = None
+        self.entities: list[Any] = []  # what is released with the track
         self.odometry: Any = None
         self.heard_s = time.monotonic()
+        self.field_heard_s = -math.inf
         self.faults_reported = 0
         self.restart()
 
@@ -98,7 +99,7 @@ class Pdr(NodeBase):
         wearers = {person.name: person for person in people if person.n100}
         for name, track in list(self._tracks.items()):
             if wearers.get(name) != track.person:
-                self.release(track.subscription, track.odometry)
+                self.release(*track.entities)
                 del self._tracks[name]
         for name, person in wearers.items():
             if name not in self._tracks and person.n100:
@@ -107,9 +108,12 @@ class Pdr(NodeBase):
     def _new_track(self, person: Person, n100: N100) -> Track:
         track = Track(person, n100)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
-        track.subscription = self.subscribe(
-            Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM, raw=True
+        name = f"/{person.name}/imu"
+        imu = self.subscribe(Imu, f"{name}/data", lambda message: self._on_imu(track, message), STREAM, raw=True)
+        mag = self.subscribe(
+            MagneticField, f"{name}/mag", lambda message: self._on_field(track, message), STREAM, raw=True
         )
+        track.entities = [track.odometry, imu, mag]
         return track
 
     def _on_imu(self, track: Track, message: bytes) -> None:
@@ -123,6 +127,10 @@ class Pdr(NodeBase):
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
             self._publish_pose(track, pose)
+
+    def _on_field(self, track: Track, message: bytes) -> None:
+        track.pdr.push_field(field_sample(message))
+        track.field_heard_s = time.monotonic()
 
     def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
         name = track.person.name
@@ -177,6 +185,8 @@ class Pdr(NodeBase):
         faults = sum(pdr.faults.values())
         new_faults, track.faults_reported = faults - track.faults_reported, faults
         values = {"samples": track.samples, "steps": pdr.step_count, **pdr.faults}
+        values["magnetometer"] = "heard" if time.monotonic() - track.field_heard_s < _SILENT_S else "absent"
+        values |= {f"field_{verdict}": count for verdict, count in pdr.magnetic.verdicts.items()}
         pose = pdr.pose()
         if pose is not None:
             values["heading_sd_deg"] = f"{math.degrees(math.sqrt(pose.covariance[2, 2])):.1f}"
