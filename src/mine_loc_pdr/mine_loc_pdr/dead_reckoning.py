@@ -152,6 +152,11 @@ class PedestrianDeadReckoning:
         if learnt is not None:
             attitude.correct(*learnt)
 
+    def rescale(self, scale: float, variance: float) -> None:
+        """Make the steps from now on with another K."""
+        self._stride = self._stride.scaled(scale, variance)
+        self._drift.rescale(variance)
+
     def pose(self) -> OdometryPose | None:
         """The pose at the last sample, None before the horizon is found."""
         if self._attitude is None or self._last is None:

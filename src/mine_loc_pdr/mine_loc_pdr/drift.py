@@ -58,6 +58,13 @@ class DriftModel:
         axes = np.array([[c, -s], [s, c]])
         self.covariance[:2, :2] += axes @ np.diag([along_sd_m**2, across_sd_m**2]) @ axes.T
 
+    def rescale(self, variance: float) -> None:
+        """The step scale was found anew: what it was wrong by stays in the position, the new error is another."""
+        forgotten = np.eye(6)
+        forgotten[SCALE, SCALE] = 0.0
+        self._propagate(forgotten)
+        self.covariance[SCALE, SCALE] = variance
+
     def rest(self) -> float:
         """Learn the bias from a second of rest; the gain in 0..1 with which to pull the estimate to the mean rate.
 

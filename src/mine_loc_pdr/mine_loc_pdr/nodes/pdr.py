@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import TransformStamped
-from mine_loc_interfaces.msg import Step
+from mine_loc_interfaces.msg import Step, StrideUpdate, UwbPose
 from mine_loc_interfaces.srv import Reset
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 
 from mine_loc_core import quaternion
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_point, to_time
+from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
@@ -26,6 +26,7 @@ from mine_loc_pdr.dead_reckoning import OdometryPose, PedestrianDeadReckoning, S
 from mine_loc_pdr.parameters import PdrParameters
 from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
 from mine_loc_pdr.stride import stride_model
+from mine_loc_pdr.stride_refinement import Fix, StrideRefiner, StrideScale
 
 _PEOPLE_PERIOD_S = 1.0
 _MOUNTING_PERIOD_S = 1.0
@@ -52,14 +53,16 @@ class Track:
         """Begin at the origin of odom."""
         mounting = quaternion.from_euler_zyx(*self._n100.mounting_rpy_rad)
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
-        self.pdr = PedestrianDeadReckoning(stride_model(self.person), (float(x), float(y), float(z)))
+        stride = stride_model(self.person)
+        self.pdr = PedestrianDeadReckoning(stride, (float(x), float(y), float(z)))
+        self.refiner = StrideRefiner(stride.scale, stride.scale_variance)
         self.published_period = 0
         self.mounting_yaw_rad: float | None = None  # as last published
         self.samples = 0
 
 
 class Pdr(NodeBase):
-    """Publishes pdr/steps, and for each person <person>/odometry and the transform of base_link in odom."""
+    """Publishes pdr/steps, pdr/stride_updates, <person>/odometry and the transforms of base_link and imu_link."""
 
     parameter_class = PdrParameters
 
@@ -71,6 +74,8 @@ class Pdr(NodeBase):
         self._tracks: dict[str, Track] = {}
         self._file = PeopleFile(Path(self.parameters.site))
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
+        self._strides = self.publish_to(StrideUpdate, "pdr/stride_updates", EVENTS)
+        self.subscribe(UwbPose, "uwb/pose", self._on_uwb_pose, EVENTS)
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
         self._tf_static = self.publish_to(TFMessage, "/tf_static", LATCHED)
         self._follow(self._file.people)
@@ -123,10 +128,26 @@ class Pdr(NodeBase):
         track.heard_s = time.monotonic()
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
+            self._refine_stride(track, step)
         period = sample.stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
             self._publish_pose(track, pose)
+
+    def _refine_stride(self, track: Track, step: StepEvent) -> None:
+        first = step.interval_s is None
+        found = track.refiner.step(step.stamp_ns, complex(step.x_m, step.y_m), first=first)
+        if found is not None:
+            track.pdr.rescale(found.scale, found.variance)
+            self._strides.publish(_stride_update(track.person, step.stamp_ns, found))
+
+    def _on_uwb_pose(self, message: UwbPose) -> None:
+        track = next((t for t in self._tracks.values() if t.person.tag_id == message.tag_id), None)
+        if track is None or message.status != UwbPose.OK or "/" in message.header.frame_id:  # of a vehicle's own frame
+            return
+        place, covariance = message.pose.pose.position, message.pose.covariance
+        variance_m2 = float(max(covariance[0], covariance[7]))
+        track.refiner.fix(Fix(to_stamp_ns(message.header.stamp), complex(place.x, place.y), variance_m2))
 
     def _on_field(self, track: Track, message: bytes) -> None:
         track.pdr.push_field(field_sample(message))
@@ -186,6 +207,8 @@ class Pdr(NodeBase):
         new_faults, track.faults_reported = faults - track.faults_reported, faults
         values = {"samples": track.samples, "steps": pdr.step_count, **pdr.faults}
         values["magnetometer"] = "heard" if time.monotonic() - track.field_heard_s < _SILENT_S else "absent"
+        values["stride_k"] = f"{track.refiner.known.scale:.3f} ± {math.sqrt(track.refiner.known.variance):.3f}"
+        values |= {f"stretches_{verdict}": count for verdict, count in track.refiner.verdicts.items()}
         values |= {f"field_{verdict}": count for verdict, count in pdr.magnetic.verdicts.items()}
         pose = pdr.pose()
         if pose is not None:
@@ -217,6 +240,18 @@ def _step(person: str, step: StepEvent) -> Step:
         heading_variance=step.heading_variance_rad2,
         position=to_point((step.x_m, step.y_m, 0.0)),
         confidence=step.confidence,
+    )
+
+
+def _stride_update(person: Person, stamp_ns: int, found: StrideScale) -> StrideUpdate:
+    return StrideUpdate(
+        header=Header(stamp=to_time(stamp_ns), frame_id=f"{person.name}/odom"),
+        person=person.name,
+        k=found.scale,
+        k_variance=found.variance,
+        alpha=person.stride.alpha,
+        beta=person.stride.beta,
+        steps_used=found.steps_used,
     )
 
 
