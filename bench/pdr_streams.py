@@ -1,8 +1,8 @@
 """How many people one core carries: the node `pdr` in a process of its own, fed by this one at 100 Hz a person.
 
-Recorded walks go to it as sensor_msgs/Imu on a topic a person, evenly spread over time. What counts is the processor
-time of the node's process, its middleware's threads and its odometry included, against the samples it says it has
-taken: one core keeps up with as many streams as it takes in a second of processor time.
+Recorded walks go to it as sensor_msgs/Imu on a topic a person, evenly spread over time, and a field at 10 Hz. What counts is the processor time of the node's process, its middleware's threads and its odometry included,
+against the samples it says it has taken: one core keeps up with as many streams as it takes in a second of processor
+time.
 """
 
 import itertools
@@ -20,7 +20,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mine_loc_interfaces.msg import Step
 from pdr_recordings import Recording
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, MagneticField
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))  # how tests start a node and hear of it
 
@@ -38,6 +38,7 @@ PEOPLE = 200
 SECONDS = 20
 HEIGHT_M = 1.75
 _TURNS = 10  # a period of the samples in so many turns, for a tenth of the people each
+_FIELD_EVERY = 10  # samples, as n100_driver sends it
 _STAMP = struct.Struct("<iI")  # the header's, behind the four bytes that name the encoding
 _STAMP_AT = 4
 
@@ -65,12 +66,14 @@ def _fed(process: psutil.Process, domain: int, names: Sequence[str], samples: Se
     observer = Observer(domain)
     try:
         publishers = [observer.node.create_publisher(Imu, f"/{name}/imu/data", EVENTS) for name in names]
-        observer.wait_for(lambda: all(p.get_subscription_count() for p in publishers), 90.0, "the node's subscriptions")
+        fields = [observer.node.create_publisher(MagneticField, f"/{name}/imu/mag", EVENTS) for name in names]
+        ends = (*publishers, *fields)
+        observer.wait_for(lambda: all(p.get_subscription_count() for p in ends), 90.0, "the node's subscriptions")
         observer.listen(Step, "pdr/steps")
         reports = observer.listen(DiagnosticArray, "/diagnostics", 10)
         observer.wait_for(lambda: len(reports) > 3, what="the node to come to rest")
         before, started_s = process.cpu_times(), time.monotonic()
-        sent = _publish(publishers, [_encoded(sample) for sample in samples])
+        sent = _publish(publishers, fields, [_encoded(sample) for sample in samples])
         lasted_s, done_s = time.monotonic() - started_s, time.time()
         observer.wait_for(lambda: reports.messages[-1].header.stamp.sec > done_s + 2.0, what="the node's last counts")
         after = process.cpu_times()
@@ -95,8 +98,11 @@ def _encoded(sample: ImuSample) -> bytearray:
     return bytearray(serialize_message(imu))
 
 
-def _publish(publishers: Sequence[Any], messages: Sequence[bytearray]) -> int:
-    """The recordings to everyone, each from a place of their own on; how many samples were sent."""
+def _publish(publishers: Sequence[Any], fields: Sequence[Any], messages: Sequence[bytearray]) -> int:
+    """The recordings to everyone, each from a place of their own on; how many samples of the IMU were sent."""
+    field = MagneticField()
+    field.header.frame_id, field.magnetic_field.y, field.magnetic_field.z = "someone/imu_link", 3e-5, -4e-5
+    field_message = bytearray(serialize_message(field))
     started_ns, started_s = time.time_ns(), time.monotonic()
     apart = len(messages) // len(publishers)
     for period in range(SECONDS * RATE_HZ):
@@ -107,6 +113,9 @@ def _publish(publishers: Sequence[Any], messages: Sequence[bytearray]) -> int:
                 message = messages[(period + k * apart) % len(messages)]
                 _STAMP.pack_into(message, _STAMP_AT, *stamp)
                 publishers[k].publish(bytes(message))
+                if (period + k) % _FIELD_EVERY == 0:
+                    _STAMP.pack_into(field_message, _STAMP_AT, *stamp)
+                    fields[k].publish(bytes(field_message))
     return SECONDS * RATE_HZ * len(publishers)
 
 

@@ -146,9 +146,12 @@ class PedestrianDeadReckoning:
         orientation = next((q for stamp_ns, q, _ in reversed(self._motion) if stamp_ns <= sample.stamp_ns), None)
         if orientation is None:
             return
-        self._carry_drift()
         field_odom_t = rotated(orientation, sample.field_t)
-        learnt = self.magnetic.push(sample.stamp_ns, self._way_m, field_odom_t, attitude.heading_rad, self._drift)
+        field = self.magnetic.push(sample.stamp_ns, self._way_m, field_odom_t, attitude.heading_rad)
+        if field is None:
+            return
+        self._carry_drift()
+        learnt = self.magnetic.compare(field, self._drift)
         if learnt is not None:
             attitude.correct(*learnt)
 

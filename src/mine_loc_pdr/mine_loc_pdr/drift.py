@@ -37,9 +37,9 @@ class DriftModel:
 
     def pass_time(self, dt_s: float) -> None:
         """The bias turns the heading, the rate noise lets it wander."""
-        transition = np.eye(6)
-        transition[HEADING, BIAS] = -dt_s
-        self._propagate(transition)
+        covariance = self.covariance
+        covariance[HEADING] -= dt_s * covariance[BIAS]
+        covariance[:, HEADING] -= dt_s * covariance[:, BIAS]
         self.covariance[HEADING, HEADING] += RATE_NOISE_RAD_SQRT_S**2 * dt_s
         self.covariance[BIAS, BIAS] += BIAS_WALK_RAD_S_SQRT_S**2 * dt_s
 

@@ -33,27 +33,25 @@ class MagneticHeading:
         """Something was missed: the stretch is not one."""
         self._stretch.reset()
 
-    def push(
-        self, stamp_ns: int, way_m: float, field_odom_t: Vector3, heading_rad: float, drift: DriftModel
-    ) -> tuple[float, float] | None:
-        """Take a sample of the field in odom; the corrections of heading (rad) and bias (rad/s) that it leads to.
-
-        `drift`, which must be up to date, takes up what was learnt.
-        """
+    def push(self, stamp_ns: int, way_m: float, field_odom_t: Vector3, heading_rad: float) -> TrustedField | None:
+        """Take a sample of the field in odom; the field of a stretch that can be trusted, when it ends."""
         found = self._stretch.push(stamp_ns, way_m, field_odom_t, heading_rad)
-        if found is None:
-            return None
         if isinstance(found, str):
             self.verdicts[found] += 1
             return None
-        if self._reference is None:
+        return found
+
+    def compare(self, found: TrustedField, drift: DriftModel) -> tuple[float, float] | None:
+        """The corrections of heading (rad) and bias (rad/s) that a trusted field leads to, None if it leads to none.
+
+        `drift`, which must be up to date, takes up what was learnt.
+        """
+        reference = self._reference
+        if reference is None:
             self._reference = found
             drift.refer(AZIMUTH_SD_RAD**2)
             self.verdicts["reference"] += 1
             return None
-        return self._compare(found, self._reference, drift)
-
-    def _compare(self, found: TrustedField, reference: TrustedField, drift: DriftModel) -> tuple[float, float] | None:
         turned_rad = math.remainder(found.heading_rad - reference.heading_rad, math.tau)
         if not found.resembles(reference):
             self.verdicts["unlike_reference"] += 1
