@@ -1,8 +1,8 @@
 """How many people one core carries: the node `pdr` in a process of its own, fed by this one at 100 Hz a person.
 
-Recorded walks go to it as sensor_msgs/Imu on a topic a person, evenly spread over time, and a field at 10 Hz. What counts is the processor time of the node's process, its middleware's threads and its odometry included,
-against the samples it says it has taken: one core keeps up with as many streams as it takes in a second of processor
-time.
+Recorded walks go to it as sensor_msgs/Imu on a topic a person, evenly spread over time, and a field at 10 Hz. What
+counts is the processor time of the node's process, its middleware's threads and its odometry included, against the
+samples it says it has taken: one core keeps up with as many streams as it takes in a second of processor time.
 """
 
 import itertools
