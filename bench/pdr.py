@@ -1,9 +1,9 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap streams]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap streams activity paper_b]
 
-Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); docs/pdr.md
-explains the rows.
+Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); paper_b
+is simulated. docs/pdr.md explains the rows.
 """
 
 import argparse
@@ -19,9 +19,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core: before numpy is loade
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
+import pdr_activity
 import pdr_distance
 import pdr_heading
 import pdr_mounting
+import pdr_paper_b
 import pdr_recordings
 import pdr_steps
 import pdr_streams
@@ -64,6 +66,8 @@ PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "oxford": oxford,
     "mobgap": mobgap,
     "streams": streams,
+    "activity": pdr_activity.activity,
+    "paper_b": pdr_paper_b.paper_b,
 }
 
 
@@ -80,7 +84,8 @@ def _leaves(node: Mapping[str, Any], path: str) -> list[tuple[str, str]]:
     for name, value in node.items():
         here = f"{path}.{name}".lstrip(".")
         if isinstance(value, dict) and "mean" in value:
-            rows.append((here, f"{value['mean']} ± {value['sd']} (max {value['max']})"))
+            end = "max" if "max" in value else "min"
+            rows.append((here, f"{value['mean']} ± {value['sd']} ({end} {value[end]})"))
         elif isinstance(value, dict):
             rows += _leaves(value, here)
         else:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from mine_loc_interfaces.msg import Step
 from pdr_recordings import Recording
@@ -27,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))  # how tests start 
 from graph.domains import lent_domain
 from graph.observer import Observer
 from graph.processes import node_command, running
+from graph.walker import write_site
 
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.stamps import NS_PER_S
@@ -49,8 +49,8 @@ def streams(recordings: Sequence[Recording]) -> dict[str, Any]:
     names = [f"w{k:03}" for k in range(PEOPLE)]
     with tempfile.TemporaryDirectory() as folder, lent_domain() as domain:
         people = [{"name": name, "height_m": HEIGHT_M, "n100": {"port": f"/dev/{name}"}} for name in names]
-        (Path(folder) / "people.yaml").write_text(yaml.safe_dump({"schema": 1, "people": people}))
-        command = node_command("mine_loc_pdr.nodes.pdr", {"site": folder})
+        site = write_site(Path(folder) / "site", [], people)
+        command = node_command("mine_loc_pdr.nodes.pdr", {"site": str(site)})
         with running(command, domain, Path(folder) / "pdr.log") as node:
             rows = _fed(psutil.Process(node.process.pid), domain, names, samples)
     return rows | {"pure_modules_streams_per_core_100hz": _pure(samples)}

@@ -73,6 +73,7 @@ compile_solvers() (
     # shellcheck disable=SC1091
     . ./env.sh
     python -c 'from mine_loc_uwb import parameters, round_solver; round_solver.rehearse(parameters.UwbSolverParameters(), 2)'
+    python -c 'from mine_loc_fusion.tightly_coupled import rehearse; rehearse(2)'
 )
 
 build_workspace() {

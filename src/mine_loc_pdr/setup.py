@@ -4,7 +4,7 @@ setup(
     name="mine_loc_pdr",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"mine_loc_pdr": ["py.typed"]},
+    package_data={"mine_loc_pdr": ["py.typed", "models/*.npz"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/mine_loc_pdr"]),
         ("share/mine_loc_pdr", ["package.xml"]),

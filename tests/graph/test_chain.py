@@ -14,8 +14,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph.live_graph import LiveGraph, live_graph
 from graph.observer import Heard
-from graph.walker import VISITOR_TAG, frame, position_m, ranging
+from graph.walker import RADIUS_M, SPEED_M_S, VISITOR_TAG, frame, position_m, ranging
 from mine_loc_interfaces.msg import (
+    Activity,
     Epoch,
     FusionHealth,
     MeasurementVerdict,
@@ -44,6 +45,7 @@ TOPICS: dict[str, tuple[type, str, Any]] = {
     "imu": (Imu, "walker/imu/data", STREAM),
     "mag": (MagneticField, "walker/imu/mag", STREAM),
     "steps": (Step, "pdr/steps", 100),
+    "activity": (Activity, "pdr/activity", 100),
     "odometry": (Odometry, "walker/odometry", 100),
     "epochs": (Epoch, "sync/epochs", 100),
     "poses": (PersonPoseArray, "fused/poses", 100),
@@ -148,6 +150,13 @@ def test_epochs_that_are_not_late_are_in_order_and_use_each_round_once(heard):
     rounds = [item.seq for epoch in epochs for item in epoch.ranges]
     assert len(rounds) == len(set(rounds))
     assert [epoch.seq for epoch in epochs] == sorted(epoch.seq for epoch in epochs)
+
+
+def test_who_walks_a_circle_is_said_to_turn_by_what_four_seconds_of_it_are(heard):
+    last = heard["activity"].messages[-1]
+    assert (last.person, last.activity, last.window) == ("walker", Activity.TURNING, 4.0)
+    assert last.turn_angle == pytest.approx(4.0 * SPEED_M_S / RADIUS_M, abs=0.1)
+    assert 0.5 < last.probability <= 1.0
 
 
 def test_frames_and_ids_follow_the_conventions(heard):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from graph.observer import Observer
 from graph.processes import node_command, running
-from graph.walker import write_people
+from graph.walker import write_site
 from mine_loc_interfaces.msg import StrideUpdate, UwbPose
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
@@ -29,8 +29,8 @@ STATUS = "pdr: walker"
 @pytest.fixture
 def sensors(tmp_path: Path, domain: int, observer: Observer) -> Iterator["Sensors"]:
     people = [{"name": "walker", "tag_id": TAG, "height_m": 1.75, "n100": {"port": "/dev/none"}}]
-    write_people(tmp_path, people)
-    with running(node_command("mine_loc_pdr.nodes.pdr", {"site": str(tmp_path)}), domain, tmp_path / "pdr.log"):
+    site = write_site(tmp_path / "site", [], people)
+    with running(node_command("mine_loc_pdr.nodes.pdr", {"site": str(site)}), domain, tmp_path / "pdr.log"):
         yield Sensors(observer)
 
 

@@ -18,7 +18,7 @@ ALLOWED = {
     "mine_loc_core": set(),
     "mine_loc_uwb": {"mine_loc_core"},
     "mine_loc_pdr": {"mine_loc_core"},
-    "mine_loc_fusion": {"mine_loc_core"},
+    "mine_loc_fusion": {"mine_loc_core", "mine_loc_uwb"},
     "mine_loc_coarse": {"mine_loc_core"},
     "mine_loc_sim": {"mine_loc_core", "mine_loc_uwb", "mine_loc_pdr", "mine_loc_fusion", "mine_loc_coarse"},
 }
@@ -34,6 +34,7 @@ ROSDEP = {  # import name → rosdep key
     "rich": "python3-rich",
     "matplotlib": "python3-matplotlib",
     "numba": "python3-numba",
+    "sklearn": "python3-sklearn",
 }
 MOST_LINES = 400
 

@@ -19,9 +19,11 @@ class WalkableArea:
     """
 
     def __init__(self, galleries: Iterable[Gallery], chambers: Iterable[Chamber] = ()) -> None:
-        legs = [leg for gallery in galleries for leg in _legs(gallery)]
-        self.legs = np.array(legs).reshape(-1, 7)
+        legs = [(number, leg) for number, gallery in enumerate(galleries) for leg in _legs(gallery)]
+        self.legs = np.array([leg for _, leg in legs]).reshape(-1, 7)
         """(n, 7): start x, y, unit vector x, y, extent along it from, to, half width."""
+        self.gallery_of_leg = np.array([number for number, _ in legs], dtype=np.int64)
+        """(n,): number of the gallery that each leg is part of."""
         self.polygons = tuple(np.array(chamber.polygon_m, dtype=float) for chamber in chambers)
 
     @classmethod
@@ -33,6 +35,15 @@ class WalkableArea:
         """Distance of `points_m` (n, 2) from the area, (n,); 0 inside."""
         distance_m: Array = np.linalg.norm(points_m - self.nearest(points_m), axis=1)
         return distance_m
+
+    def outside_legs_m(self, point_m: Array) -> Array:
+        """Distance of a point (2,) from each leg's strip, (n,); 0 inside."""
+        distance_m: Array = np.linalg.norm(_nearest_in_legs(self.legs, point_m[None])[:, 0] - point_m, axis=1)
+        return distance_m
+
+    def outside_chambers_m(self, point_m: Array) -> Array:
+        """Distance of a point (2,) from each chamber, (n,); 0 inside."""
+        return np.array([np.linalg.norm(_nearest_in(p, point_m[None])[0] - point_m) for p in self.polygons])
 
     def nearest(self, points_m: Array) -> Array:
         """The point of the area nearest to each of `points_m` (n, 2); a point inside is its own."""

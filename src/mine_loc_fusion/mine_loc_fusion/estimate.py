@@ -1,37 +1,29 @@
 """What every estimator takes and answers."""
 
 from dataclasses import dataclass
-from enum import IntEnum
-from math import inf
+from math import inf, isfinite, nan, sqrt
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from mine_loc_core.verdicts import Verdict
+from mine_loc_core.gates import chi2_quantile
+from mine_loc_core.verdicts import Source, Verdict
+from mine_loc_uwb.measurements import Measurements
 
 Array = npt.NDArray[np.float64]
 
 
-class Mode(IntEnum):
-    """Constants of mine_loc_interfaces/PersonPose: what an estimate rests on."""
-
-    UNKNOWN = 0
-    INITIALISING = 1
-    UWB_PDR = 2
-    UWB_ONLY = 3
-    DEAD_RECKONING = 4
-    COASTING = 5
-    COARSE_ONLY = 6
-    LOST = 7
-
-
 @dataclass(frozen=True, slots=True)
 class PositionFix:
-    """A solved position: `position_m` (2,) in the map, `covariance_m2` (2, 2)."""
+    """A solved position: `position_m` (2,) in the map, `covariance_m2` (2, 2).
+
+    `los_probability` is the mean over the links it rests on, NaN = not judged.
+    """
 
     position_m: Array
     covariance_m2: Array
+    los_probability: float = nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +38,29 @@ class StepFix:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceFix:
+    """A place told by something else than ranges: a recognised turn, a coarse region, somebody who knows.
+
+    Horizontal, `position_m` (2,) in the map with `covariance_m2` (2, 2); `source` is LANDMARK or REGION.
+    """
+
+    source: Source
+    position_m: Array
+    covariance_m2: Array
+
+
+@dataclass(frozen=True, slots=True)
 class EpochInputs:
-    """The measurements of one epoch, in the order they are to be used."""
+    """The measurements of one epoch.
+
+    `ranges` are rounds and blinks, `positions` what a solver made of them: an estimator uses the one or the other.
+    """
 
     stamp_ns: int
     positions: tuple[PositionFix, ...] = ()
     steps: tuple[StepFix, ...] = ()
+    ranges: tuple[Measurements, ...] = ()
+    places: tuple[PlaceFix, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +75,22 @@ class Estimate:
     position_m: Array
     velocity_ms: Array
     covariance: Array
-    mode: Mode
     yaw_offset_rad: float | None = None
     since_uwb_s: float = inf
     since_step_s: float = inf
+    since_region_s: float = inf
+    height_m: float | None = None
+    """Where it is solved for."""
 
 
 class Estimator(Protocol):
     """One person's filter. Stamps given to `update` do not go back; `save` and `restore` serve late inputs."""
 
+    def begin(self, stamp_ns: int, position_m: Array, covariance_m2: Array, yaw: tuple[float, float] | None) -> None:
+        """Start at a place (2,) in the map; `yaw` is that of the odom frame and its variance, None = unknown."""
+
     def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
-        """Predict to the epoch and use its measurements; one verdict a measurement, in order."""
+        """Predict to the epoch and use its measurements; one verdict a measurement."""
 
     def estimate(self, stamp_ns: int) -> Estimate | None:
         """The state predicted to `stamp_ns` without changing it; None before the first position."""
@@ -86,3 +100,30 @@ class Estimator(Protocol):
 
     def restore(self, saved: Any) -> None:
         """Go back to a saved state."""
+
+
+_FARTHEST_M = 1e8  # beyond any map, grid coordinates included
+_LARGEST_SD_M = 1e4  # a position that is no surer says nothing
+_LONGEST_STEP_M = 5.0
+
+
+def is_position(position_m: Array, covariance_m2: Array) -> bool:
+    """Whether these are a place (2,) and a covariance (2, 2)."""
+    finite = np.abs(position_m).max() < _FARTHEST_M and np.abs(covariance_m2).max() < _LARGEST_SD_M**2  # false for NaN
+    return bool(finite and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T)[0] > 0.0)
+
+
+def is_step(step: StepFix) -> bool:
+    """Whether this is a step that a person can make, with variances."""
+    variances = step.length_variance_m2, step.heading_variance_rad2
+    possible = 0.0 <= step.length_m < _LONGEST_STEP_M and isfinite(step.heading_rad)
+    return possible and all(0.0 <= variance < inf for variance in variances)
+
+
+def ce95_m(covariance_m2: Array) -> float:
+    """Radius of the circle round the mean that holds a Gaussian (2, 2) with probability 0.95, from above.
+
+    Exact for a circular distribution; for a long one the quantile of its longer axis, which is never less.
+    """
+    largest = float(np.linalg.eigvalsh(covariance_m2)[-1])
+    return sqrt(max(largest, 0.0) * chi2_quantile(0.95, 2))

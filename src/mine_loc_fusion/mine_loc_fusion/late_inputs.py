@@ -4,7 +4,7 @@ from collections import deque
 from typing import Any
 
 from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_fusion.estimate import EpochInputs, Estimate, Estimator
+from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, Estimator
 
 
 class LateInputCorrector:
@@ -30,6 +30,11 @@ class LateInputCorrector:
         self._drop_old()
         return verdicts
 
+    def begin(self, stamp_ns: int, position_m: Array, covariance_m2: Array, yaw: tuple[float, float] | None) -> None:
+        """See Estimator; what came before is forgotten."""
+        self._history.clear()
+        self._estimator.begin(stamp_ns, position_m, covariance_m2, yaw)
+
     def estimate(self, stamp_ns: int) -> Estimate | None:
         """See Estimator."""
         return self._estimator.estimate(stamp_ns)
@@ -45,5 +50,7 @@ class LateInputCorrector:
 
 
 def _stale(inputs: EpochInputs) -> tuple[Verdict, ...]:
-    positions = tuple(Verdict(Source.UWB_POSE, 0, Reason.STALE) for _ in inputs.positions)
-    return positions + tuple(Verdict(Source.STEP, 0, Reason.STALE) for _ in inputs.steps)
+    sources = [Source.UWB_POSE for _ in inputs.positions] + [Source.STEP for _ in inputs.steps]
+    sources += [Source.TDOA if each.shared_offset else Source.RANGE for each in inputs.ranges]
+    sources += [place.source for place in inputs.places]
+    return tuple(Verdict(source, 0, Reason.STALE) for source in sources)

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from mine_loc_core.parameters import NodeParameters, parameter
 
+METHODS = ("mine_loc", "los_weighted", "los_weighted_residual", "robust_kf", "ekf", "adaptive_ekf")
+
 
 @dataclass(frozen=True)
 class SynchroniserParameters(NodeParameters):
@@ -24,15 +26,20 @@ class FusionParameters(NodeParameters):
     """One pose per person."""
 
     instance: str = parameter("fusion", "name of this instance in its outputs", read_only=True)
-    acceleration_sd: float = parameter(
-        1.0, "how abruptly people change speed, over one second", unit="m/s^2", low=0.01, high=20.0
+    people: str = parameter(
+        "", "names of the people this instance serves, with commas between; empty = all", read_only=True
     )
-    gate_probability: float = parameter(0.999, "share of good positions that pass", unit="1", low=0.5, high=0.999999)
-    reopen_s: float = parameter(
-        2.0, "positions refused for so long start the filter anew", unit="s", low=0.1, high=60.0
+    method: str = parameter("mine_loc", "estimator of a person", choices=METHODS)
+    range_correction: str = parameter(
+        "", "file of `mine-loc fit-ranges`; a relative path starts at the site's folder; empty = none", read_only=True
     )
+    max_range_m: float = parameter(300.0, "longer ranges are impossible", unit="m", low=1.0, high=1000.0)
+    arrival_sd_m: float = parameter(0.15, "standard deviation of a blink's arrivals", unit="m", low=0.001, high=10.0)
     uwb_timeout_s: float = parameter(
         1.0, "no position for so long: dead reckoning or coasting", unit="s", low=0.1, high=60.0
+    )
+    region_after_s: float = parameter(
+        10.0, "coarse regions count after so long without a position", unit="s", low=1.0, high=3600.0
     )
     step_timeout_s: float = parameter(
         2.0, "no step for so long: standing, or no step detector", unit="s", low=0.1, high=60.0

@@ -38,3 +38,6 @@ class PdrParameters(NodeParameters):
         choices=("walking", "stated"),
     )
     odometry_rate: float = parameter(10.0, "of <person>/odometry and /tf", unit="Hz", low=0.1, high=200.0)
+    activity_model: str = parameter(
+        "", "file written by mine-loc train-activity; empty = the one that is shipped", read_only=True
+    )

@@ -7,6 +7,7 @@ agree, if more do than the place has coordinates and the person can have got the
 capture it).
 """
 
+import copy
 import math
 from dataclasses import replace
 
@@ -44,26 +45,64 @@ _COASTED_S, _WIDE_M = 1.0, 1.0
 
 
 class RobustTracker:
-    """Tracks one tag; see `Solver`."""
+    """Tracks one tag; see `Solver`.
 
-    def __init__(self, settings: RobustTrackerSettings | None = None) -> None:
+    The state `x` and its covariance `P` are open to a caller who estimates more than ranges tell (`tracker_kernel` says
+    where `own_states` of them stand) and who may correct both by other measurements.
+    """
+
+    def __init__(self, settings: RobustTrackerSettings | None = None, own_states: int = 0) -> None:
         self._settings = settings or RobustTrackerSettings()
         self._noise = self._settings.noise()
         self._gate = chi2_quantile(self._settings.gate, 1)
-        self._x, self._P = np.empty(0), np.empty((0, 0))
-        self._started = False
-        self._stamp_ns = self._trusted_ns = 0
+        self._own_states = own_states
+        self.x, self.P = np.empty(0), np.empty((0, 0))
+        self.starts = 0
+        """How often the track has begun anew."""
+        self.motion_known = False
+        """Whether the caller knows how the person moves: doubt about ranges then casts none on the place."""
+        self._stamp_ns = self._round_ns = self._trusted_ns = 0
         self._doubt_s = 0.0
         self._slot: dict[int, int] = {}
         self._known = b"", np.empty(0, np.int64)
         self._link_nlos = np.empty(0)
 
+    def copy(self) -> "RobustTracker":
+        """A tracker in the same state that goes its own way."""
+        other = copy.copy(self)
+        for name in ("x", "P", "_link_nlos", "_slot"):  # what changes in place
+            setattr(other, name, getattr(self, name).copy())
+        return other
+
+    @property
+    def started(self) -> bool:
+        """Whether there is a place."""
+        return self.starts > 0
+
+    @property
+    def first_link(self) -> int:
+        """Where the biases of links begin in the state."""
+        return len(self.x) - len(self._link_nlos)
+
+    @property
+    def dimensions(self) -> int:
+        """How many coordinates a place has."""
+        return (self.first_link - self._own_states - 1) // 2
+
+    def advance(self, stamp_ns: int) -> None:
+        """Predict the state to an instant; to an earlier one than that of the state nothing changes."""
+        gone_s = (stamp_ns - self._stamp_ns) / NS_PER_S
+        if self.started and gone_s > 0.0:
+            kernel.predict(self.x, self.P, self.dimensions, self.first_link, gone_s, self._noise)
+            self._stamp_ns = stamp_ns
+
     def solve(self, measurements: Measurements) -> Solution:
         """See `Solver`."""
-        gone_s = max(measurements.stamp_ns - self._stamp_ns, 0) / NS_PER_S
-        if not self._started or gone_s > self._settings.restart_after_s:
+        gone_s = max(measurements.stamp_ns - self._round_ns, 0) / NS_PER_S
+        if not self.started or gone_s > self._settings.restart_after_s:
             return self._begin(measurements)
-        found = self._place_within_wide_spread(measurements, gone_s)
+        self.advance(measurements.stamp_ns)
+        found = self._place_within_wide_spread(measurements)
         if found is not None:
             return self._begin_at(found, measurements)
         slots = self._slots_of(measurements.anchor_ids)
@@ -71,12 +110,12 @@ class RobustTracker:
         quality, claimed_m2 = np.empty(tracker_round.QUALITIES), np.zeros((3, 3))
         offset_unknown = int(measurements.shared_offset and len(slots) > 0)
         tracker_round.take_round(
-            self._x, self._P, measurements.dimensions, measurements.anchors_m, slots, measurements.range_m,
-            measurements.variance_m2, measurements.since_s, measurements.plane_m, measurements.los_probability,
-            measurements.receive_power_dbm, self._link_nlos, gone_s, offset_unknown, self._gate, self._noise,
-            codes, deviances, quality, claimed_m2,
+            self.x, self.P, measurements.dimensions, self.first_link, measurements.anchors_m, slots,
+            measurements.range_m, measurements.variance_m2, measurements.since_s, measurements.plane_m,
+            measurements.los_probability, measurements.receive_power_dbm, self._link_nlos, gone_s, offset_unknown,
+            self._gate, self._noise, codes, deviances, quality, claimed_m2,
         )  # fmt: skip
-        self._stamp_ns = measurements.stamp_ns
+        self._round_ns = measurements.stamp_ns
         reasons = tuple([_REASON[code] for code in codes.tolist()])
         used, rms, dilution, short, holding = quality.tolist()
         fix = self._fix(measurements, claimed_m2, int(used), rms, dilution)
@@ -103,7 +142,8 @@ class RobustTracker:
         found = self._agreed_place(measurements)
         if found is not None and self._can_be_at(found, measurements.stamp_ns):
             return self._begin_at(found, measurements)
-        solution = replace(solution, fix=self._widened(solution.fix))
+        if not self.motion_known:
+            solution = replace(solution, fix=self._widened(solution.fix))
         if found is None:
             return solution
         refused = Reason.CAPTURE_GUARD
@@ -118,24 +158,22 @@ class RobustTracker:
         d, covariance_m2 = fix.dimensions, fix.covariance_m2.copy()
         way_m = self._settings.top_speed_m_s * (self._stamp_ns - self._trusted_ns) / NS_PER_S
         for axis in range(d):
-            self._P[axis, axis] = max(self._P[axis, axis], (way_m / 3.0) ** 2)
-            self._P[d + axis, d + axis] = max(self._P[d + axis, d + axis], self._settings.first_speed_sd_m_s**2)
-            covariance_m2[axis, axis] = max(covariance_m2[axis, axis], self._P[axis, axis])
+            self.P[axis, axis] = max(self.P[axis, axis], (way_m / 3.0) ** 2)
+            self.P[d + axis, d + axis] = max(self.P[d + axis, d + axis], self._settings.first_speed_sd_m_s**2)
+            covariance_m2[axis, axis] = max(covariance_m2[axis, axis], self.P[axis, axis])
         return replace(fix, covariance_m2=covariance_m2)
 
-    def _place_within_wide_spread(self, measurements: Measurements, gone_s: float) -> Consensus | None:
+    def _place_within_wide_spread(self, measurements: Measurements) -> Consensus | None:
         """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
         d = measurements.dimensions
         coasted_s = (measurements.stamp_ns - self._trusted_ns) / NS_PER_S
-        if coasted_s < _COASTED_S or len(measurements) <= d:
+        variance = float(np.trace(self.P[:d, :d]))
+        if coasted_s < _COASTED_S or len(measurements) <= d or variance <= _WIDE_M**2:
             return None
-        here, moving, speed = (self._P[row : row + d, column : column + d] for row, column in ((0, 0), (0, d), (d, d)))
-        variance = float(np.trace(here + gone_s * (2.0 * moving + gone_s * speed)))
-        variance += d * self._settings.acceleration_density_m2_s3 * gone_s**3 / 3.0
-        found = self._agreed_place(measurements) if variance > _WIDE_M**2 else None
+        found = self._agreed_place(measurements)
         if found is None:
             return None
-        way_m = float(np.linalg.norm(found.position_m - self._x[:d] - gone_s * self._x[d : 2 * d]))
+        way_m = float(np.linalg.norm(found.position_m - self.x[:d]))
         reachable = self._can_be_at(found, measurements.stamp_ns)
         return found if reachable and way_m < 3.0 * math.sqrt(variance) else None
 
@@ -150,7 +188,7 @@ class RobustTracker:
         gone_s = (stamp_ns - self._trusted_ns) / NS_PER_S
         d = len(found.position_m)
         sd_m = math.sqrt(np.trace(found.covariance_m2))
-        way_m = float(np.linalg.norm(found.position_m - self._x[:d]))
+        way_m = float(np.linalg.norm(found.position_m - self.x[:d]))
         unanimous = len(found.agreeing) > d + 1 and bool(found.agreeing.all())
         return way_m <= self._settings.top_speed_m_s * gone_s + 2.0 * sd_m or (
             unanimous and self._doubt_s >= self._settings.guard_s
@@ -171,17 +209,17 @@ class RobustTracker:
 
     def _begin_at(self, found: Consensus, measurements: Measurements) -> Solution:
         """Start where ranges agree; of two places that are as good all are believed."""
-        self._place(measurements, found.position_m, found.covariance_m2)
+        self.place(measurements.stamp_ns, found.position_m, found.covariance_m2)
         codes = np.where(found.agreeing | found.ambiguous, kernel.ACCEPTED, kernel.TOO_LONG)
         slots, d = self._slots_of(measurements.anchor_ids), measurements.dimensions
         quality, claimed_m2 = np.empty(tracker_round.QUALITIES), np.zeros((3, 3))
         unknown = np.full(len(codes), math.nan)
         tracker_round.judge_round(
-            self._x, d, measurements.anchors_m, slots, measurements.range_m, measurements.since_s,
+            self.x, d, self.first_link, measurements.anchors_m, slots, measurements.range_m, measurements.since_s,
             measurements.plane_m, codes, unknown, quality,
         )  # fmt: skip
         tracker_round.claim(
-            self._x, self._P, d, measurements.anchors_m, measurements.plane_m, codes, self._noise, claimed_m2
+            self.x, self.P, d, measurements.anchors_m, measurements.plane_m, codes, self._noise, claimed_m2
         )
         used, rms, dilution, *_ = quality.tolist()
         reasons = tuple([_REASON[code] for code in codes.tolist()])
@@ -211,16 +249,21 @@ class RobustTracker:
         everyone = np.ones(len(measurements), np.bool_)
         return Consensus(fix.position_m[:d], fix.covariance_m2[:d, :d], everyone, ambiguous=False)
 
-    def _place(self, measurements: Measurements, position_m: Array, covariance_m2: Array) -> None:
-        """Begin at a place, at rest, with nothing known of the links."""
-        d = len(position_m)
-        self._x, self._P = np.zeros(2 * d + 1), np.zeros((2 * d + 1, 2 * d + 1))
-        self._x[:d], self._P[:d, :d] = position_m, covariance_m2
-        self._P[range(d, 2 * d), range(d, 2 * d)] = self._settings.first_speed_sd_m_s**2
-        self._P[2 * d, 2 * d] = self._settings.common_bias_sd_m**2
+    def place(self, stamp_ns: int, position_m: Array, covariance_m2: Array) -> None:
+        """Begin at a place (d,), at rest, with nothing known of the links; the caller's states stay."""
+        d, own = len(position_m), self._own_states
+        x, P = np.zeros(2 * d + 1 + own), np.zeros((2 * d + 1 + own, 2 * d + 1 + own))
+        if self.started and own:
+            last = slice(self.first_link - own, self.first_link)
+            x[-own:], P[-own:, -own:] = self.x[last], self.P[last, last]
+        x[:d], P[:d, :d] = position_m, covariance_m2
+        P[range(d, 2 * d), range(d, 2 * d)] = self._settings.first_speed_sd_m_s**2
+        P[2 * d, 2 * d] = self._settings.common_bias_sd_m**2
+        self.x, self.P = x, P
         self._slot, self._known, self._link_nlos = {}, (b"", np.empty(0, np.int64)), np.empty(0)
-        self._stamp_ns = self._trusted_ns = measurements.stamp_ns
-        self._doubt_s, self._started = 0.0, True
+        self._stamp_ns = self._round_ns = self._trusted_ns = stamp_ns
+        self._doubt_s = 0.0
+        self.starts += 1
 
     def _slots_of(self, anchor_ids: Ids) -> Slots:
         """Place of each link's bias in the state; the same anchors as last time are the usual case."""
@@ -235,18 +278,18 @@ class RobustTracker:
         if slot is None:
             if len(self._slot) < _MOST_LINKS:
                 slot = len(self._slot)
-                self._x, self._P = np.append(self._x, 0.0), np.pad(self._P, ((0, 1), (0, 1)))
+                self.x, self.P = np.append(self.x, 0.0), np.pad(self.P, ((0, 1), (0, 1)))
                 self._link_nlos = np.append(self._link_nlos, 0.0)
             else:
                 slot = self._slot.pop(next(iter(self._slot)))
-            bias = len(self._x) - len(self._link_nlos) + slot
-            self._x[bias], self._P[bias], self._P[:, bias] = 0.0, 0.0, 0.0
-            self._P[bias, bias], self._link_nlos[slot] = self._settings.bias_sd_m**2, self._settings.nlos_share
+            bias = self.first_link + slot
+            self.x[bias], self.P[bias], self.P[:, bias] = 0.0, 0.0, 0.0
+            self.P[bias, bias], self._link_nlos[slot] = self._settings.bias_sd_m**2, self._settings.nlos_share
         self._slot[anchor_id] = slot
         return slot
 
     def _fix(self, measurements: Measurements, claimed_m2: Array, used: int, rms_m: float, dilution: float) -> Fix:
-        position = self._x[:3].copy()
+        position = self.x[:3].copy()
         if measurements.height_m is not None:
             position[2] = measurements.height_m
         return Fix(FixStatus.OK, position, claimed_m2, measurements.dimensions, used, rms_m, dilution)

@@ -1,8 +1,9 @@
 """The arithmetic of `robust_tracker`: an extended Kalman filter over position, velocity and range biases.
 
-State x, of size 2d + 1 + L: position (d,), velocity (d,), what all ranges of the tag have in common, and the bias of
-each of L links. The first covers the tag's own antenna delay; for the arrivals of a blink it is their unknown offset.
-Ranges are taken one by one, each at its own instant, by the score of their one-sided noise (`one_sided_noise`).
+State x: position (d,), velocity (d,), what all ranges of the tag have in common, what else the caller estimates, and
+from `first_link` on the bias of each of L links. What is common covers the tag's own antenna delay; for the arrivals of
+a blink it is their unknown offset. Ranges are taken one by one, each at its own instant, by the score of their
+one-sided noise (`one_sided_noise`).
 """
 
 import math
@@ -32,8 +33,9 @@ Integers = npt.NDArray[np.int64]
     LEVEL_EXPONENT,
     LEVEL_SD,
     SYSTEMATIC_SD,
+    JUDGEMENT_WEIGHT,
     SETTINGS,
-) = range(15)
+) = range(16)
 """Places of the settings in the array `noise`, and how many they are."""
 
 ACCEPTED, TOO_LONG, TOO_SHORT, IMPOSSIBLE, CONTESTED = range(5)
@@ -45,8 +47,11 @@ _IMPOSSIBLE_SDS = 5.0
 
 
 @njit(cache=True)
-def predict(x: Array, P: Array, dimensions: int, gone_s: float, noise: Array) -> None:
-    """White acceleration moves the person; biases return to 0 with their time constants (Gauss–Markov)."""
+def predict(x: Array, P: Array, dimensions: int, first_link: int, gone_s: float, noise: Array) -> None:
+    """White acceleration moves the person; biases return to 0 with their time constants (Gauss–Markov).
+
+    The caller's own states stay.
+    """
     d, size = dimensions, len(x)
     q = noise[ACCELERATION] * gone_s
     common = math.exp(-gone_s / noise[COMMON_TIME])
@@ -63,6 +68,8 @@ def predict(x: Array, P: Array, dimensions: int, gone_s: float, noise: Array) ->
         P[d + i, i] += q * gone_s / 2.0
         P[d + i, d + i] += q
     for i in range(2 * d, size):
+        if 2 * d < i < first_link:
+            continue
         fade = common if i == 2 * d else link
         x[i] *= fade
         for j in range(size):
@@ -77,6 +84,7 @@ def open_offset(
     x: Array,
     P: Array,
     dimensions: int,
+    first_link: int,
     anchor_m: Array,
     slot: int,
     arrival_m: float,
@@ -91,7 +99,7 @@ def open_offset(
 
     An excess of probability p and mean s has mean p s and variance p (2 - p) s².
     """
-    d, size, common, bias = dimensions, len(x), 2 * dimensions, 2 * dimensions + 1 + slot
+    d, size, common, bias = dimensions, len(x), 2 * dimensions, first_link + slot
     at, unit, free = work[0], work[1], work[2]
     for axis in range(d):
         at[axis] = x[axis] + since_s * x[d + axis]
@@ -118,6 +126,7 @@ def take_range(
     x: Array,
     P: Array,
     dimensions: int,
+    first_link: int,
     anchor_m: Array,
     slot: int,
     range_m: float,
@@ -138,7 +147,7 @@ def take_range(
     fix. An excess that lasts is no new witness each time: it counts by the share `fresh` of its time that has gone.
     `work` is (3, size) of scratch.
     """
-    d, size, common, bias = dimensions, len(x), 2 * dimensions, 2 * dimensions + 1 + slot
+    d, size, common, bias = dimensions, len(x), 2 * dimensions, first_link + slot
     at, unit, gain = work[0], work[1], work[2]
     for axis in range(d):
         at[axis] = x[axis] + since_s * x[d + axis]

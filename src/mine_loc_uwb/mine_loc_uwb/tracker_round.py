@@ -12,6 +12,7 @@ from mine_loc_uwb.tracker_kernel import (
     ACCEPTED,
     CONTESTED,
     IMPOSSIBLE,
+    JUDGEMENT_WEIGHT,
     LEVEL_SD,
     NLOS_GROWTH,
     NLOS_SCALE,
@@ -22,7 +23,6 @@ from mine_loc_uwb.tracker_kernel import (
     TOP_SPEED,
     Integers,
     open_offset,
-    predict,
     take_level,
     take_range,
 )
@@ -43,6 +43,7 @@ def take_round(
     x: Array,
     P: Array,
     dimensions: int,
+    first_link: int,
     anchors_m: Array,
     slots: Integers,
     range_m: Array,
@@ -61,7 +62,7 @@ def take_round(
     quality: Array,
     claimed_m2: Array,
 ) -> None:
-    """Predict by `gone_s` and take all ranges of a round.
+    """Take all ranges of a round, `gone_s` after the last one, into a state predicted to it.
 
     What fits best is taken first, so that it decides what becomes of the rest. `link_nlos` (L,) is how far each link is
     believed to be obstructed by its own ranges; belief fades to the share of links that are. A judgement of the link
@@ -71,10 +72,9 @@ def take_round(
     the round was, in `claimed_m2` (3, 3), zeros before, the covariance to claim.
     """
     work = np.empty((3, len(x)))
-    predict(x, P, dimensions, gone_s, noise)
     x_before, P_before, nlos_before = x.copy(), P.copy(), link_nlos.copy()
     fresh = min(gone_s / noise[NLOS_TIME], 1.0)
-    memory, share = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE]
+    memory, share, weight = math.exp(-gone_s / noise[NLOS_TIME]), noise[NLOS_SHARE], noise[JUDGEMENT_WEIGHT]
     for slot in range(len(link_nlos)):  # of all links, heard or not
         link_nlos[slot] = share + memory * (link_nlos[slot] - share)
     todo = np.ones(len(range_m), np.bool_)
@@ -82,22 +82,23 @@ def take_round(
         first = _surest(level_dbm, noise)
         todo[first] = False
         slot = slots[first]
-        belief = _shifted(link_nlos[slot], los_probability[first])
+        belief = _shifted(link_nlos[slot], los_probability[first], weight)
         codes[first], deviances[first] = ACCEPTED, 0.0
         open_offset(
-            x, P, dimensions, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first], height_m,
-            belief, _scale_m(level_dbm[first], noise), work,
+            x, P, dimensions, first_link, anchors_m[first], slot, range_m[first], variance_m2[first], since_s[first],
+            height_m, belief, _scale_m(level_dbm[first], noise), work,
         )  # fmt: skip
     for _ in range(todo.sum()):
-        number = _most_credible(x, dimensions, anchors_m, slots, range_m, height_m, todo, work)
+        number = _most_credible(x, dimensions, first_link, anchors_m, slots, range_m, height_m, todo, work)
         todo[number] = False
         slot = slots[number]
-        belief = _shifted(link_nlos[slot], los_probability[number])
+        belief = _shifted(link_nlos[slot], los_probability[number], weight)
         codes[number], deviances[number], nlos = take_range(
-            x, P, dimensions, anchors_m[number], slot, range_m[number], variance_m2[number], since_s[number],
-            height_m, belief, _scale_m(level_dbm[number], noise), fresh, gone_s * noise[TOP_SPEED], gate, work,
+            x, P, dimensions, first_link, anchors_m[number], slot, range_m[number], variance_m2[number],
+            since_s[number], height_m, belief, _scale_m(level_dbm[number], noise), fresh,
+            gone_s * noise[TOP_SPEED], gate, work,
         )  # fmt: skip
-        link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number])  # the judgement taken out again
+        link_nlos[slot] = _shifted(nlos, 1.0 - los_probability[number], weight)  # the judgement taken out again
     if noise[LEVEL_SD] > 0.0:
         for number in range(len(range_m)):
             if codes[number] == ACCEPTED and not math.isnan(level_dbm[number]):
@@ -105,7 +106,7 @@ def take_round(
     if len(codes) >= _CONTEST and 2 * np.sum(codes == ACCEPTED) < len(codes):
         x[:], P[:], link_nlos[:] = x_before, P_before, nlos_before
         codes[codes == ACCEPTED] = CONTESTED
-    judge_round(x, dimensions, anchors_m, slots, range_m, since_s, height_m, codes, deviances, quality)
+    judge_round(x, dimensions, first_link, anchors_m, slots, range_m, since_s, height_m, codes, deviances, quality)
     claim(x, P, dimensions, anchors_m, height_m, codes, noise, claimed_m2)
 
 
@@ -113,6 +114,7 @@ def take_round(
 def judge_round(
     x: Array,
     dimensions: int,
+    first_link: int,
     anchors_m: Array,
     slots: Integers,
     range_m: Array,
@@ -133,7 +135,7 @@ def judge_round(
         for axis in range(d):
             at[axis] = x[axis] + since_s[number] * x[d + axis]
         distance = direction(at, anchors_m[number], height_m, unit)
-        squares += (range_m[number] - distance - x[2 * d] - x[2 * d + 1 + slots[number]]) ** 2
+        squares += (range_m[number] - distance - x[2 * d] - x[first_link + slots[number]]) ** 2
         used[number] = 1.0
         quality[HOLDING] += deviances[number] < _HOLDING_DEVIANCE
     quality[USED] = used.sum()
@@ -189,11 +191,11 @@ def _surest(level_dbm: Array, noise: Array) -> int:
 
 
 @njit(cache=True)
-def _shifted(belief: float, los_probability: float) -> float:
-    """Belief in an obstruction after a judgement of the link; NaN = there is none."""
+def _shifted(belief: float, los_probability: float, weight: float) -> float:
+    """Belief in an obstruction after a judgement of the link whose odds count by `weight`; NaN = there is none."""
     if not math.isnan(los_probability):
-        against = belief * (1.0 - los_probability)
-        belief = against / (against + (1.0 - belief) * los_probability)
+        against = belief * (1.0 - los_probability) ** weight
+        belief = against / (against + (1.0 - belief) * los_probability**weight)
     return min(max(belief, _LEAST_NLOS), _MOST_NLOS)
 
 
@@ -201,6 +203,7 @@ def _shifted(belief: float, los_probability: float) -> float:
 def _most_credible(
     x: Array,
     dimensions: int,
+    first_link: int,
     anchors_m: Array,
     slots: Integers,
     range_m: Array,
@@ -213,7 +216,7 @@ def _most_credible(
     for number in range(len(range_m)):
         if todo[number]:
             distance = direction(x[:dimensions], anchors_m[number], height_m, work[1, :dimensions])
-            error = abs(range_m[number] - distance - x[2 * dimensions] - x[2 * dimensions + 1 + slots[number]])
+            error = abs(range_m[number] - distance - x[2 * dimensions] - x[first_link + slots[number]])
             if error <= least:
                 best, least = number, error
     return best

@@ -31,6 +31,8 @@ class RobustTrackerSettings:
     """By how much the logarithm of that mean grows as the received level falls below -92 dBm by 1 dB."""
     nlos_time_s: float = 1.0
     """A walker passes what obstructs a link within some such times."""
+    judgement_weight: float = 1.0
+    """Share of a judgement's logarithmic odds that counts: a classifier is less sure where it was not trained."""
     nlos_share: float = 0.5
     """Share of links that are obstructed where nothing is known of them."""
     path_loss: PathLoss | None = None
@@ -60,6 +62,7 @@ class RobustTrackerSettings:
         values[kernel.NLOS_TIME] = self.nlos_time_s
         values[kernel.NLOS_SHARE], values[kernel.TOP_SPEED] = self.nlos_share, self.top_speed_m_s
         values[kernel.SYSTEMATIC_SD] = self.systematic_sd_m
+        values[kernel.JUDGEMENT_WEIGHT] = self.judgement_weight
         loss = self.path_loss
         values[kernel.LEVEL_1M] = loss.level_1m_dbm if loss else math.nan
         values[kernel.LEVEL_EXPONENT] = loss.exponent if loss else math.nan

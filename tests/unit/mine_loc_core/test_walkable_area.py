@@ -40,5 +40,13 @@ def test_a_nearest_point_is_inside_and_nothing_on_the_centre_lines_is_nearer(poi
     assert AREA.outside_m(at)[0] <= np.min(np.hypot(*(line - at).T)) + 1e-9
 
 
+def test_legs_know_their_gallery_and_how_far_a_point_is_from_each():
+    area = WalkableArea([BEND, Gallery("side", ((0, 10, 0), (10, 10, 0)), width_m=2.0, height_m=3.0)], [ROOM])
+    assert area.gallery_of_leg.tolist() == [0, 0, 1]
+    assert area.outside_legs_m(np.array([10.0, 5.0])) == pytest.approx([3.0, 8.0, 4.0])
+    assert area.outside_chambers_m(np.array([10.0, 35.0])) == pytest.approx([5.0])
+    assert area.outside_chambers_m(np.array([20.0, 35.0])) == pytest.approx([0.0])
+
+
 def test_a_site_without_galleries_and_chambers_has_no_area():
     assert WalkableArea.of(Site("open", "map", 2, 1.0)) is None

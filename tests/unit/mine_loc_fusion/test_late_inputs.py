@@ -8,17 +8,16 @@ from hypothesis import strategies as st
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_core.verdicts import Reason, Source
+from mine_loc_fusion.ekf import Ekf
 from mine_loc_fusion.estimate import EpochInputs, PositionFix, StepFix
 from mine_loc_fusion.late_inputs import LateInputCorrector
-from mine_loc_fusion.parameters import FusionParameters
-from mine_loc_fusion.pose_filter import PoseFilter
 
 T0 = 1_760_000_000 * NS_PER_S
 HISTORY_NS = 2 * NS_PER_S
 
 
 def corrector():
-    return LateInputCorrector(PoseFilter(FusionParameters()), HISTORY_NS)
+    return LateInputCorrector(Ekf(), HISTORY_NS)
 
 
 def walk(count, period_ms=100):

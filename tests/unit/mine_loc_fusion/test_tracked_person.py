@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from mine_loc_core.people import Person, Stride
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_core.verdicts import Reason
-from mine_loc_fusion.estimate import EpochInputs, Mode, PositionFix
+from mine_loc_fusion.estimate import EpochInputs, PositionFix
+from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.parameters import FusionParameters
 from mine_loc_fusion.tracked_person import TrackedPerson
 

@@ -200,8 +200,8 @@ def test_the_covariance_stays_one_over_a_long_walk():
     for _ in range(2000):
         solution = track.round()
     assert is_covariance(solution.fix.covariance_m2)
-    assert np.allclose(track.tracker._P, track.tracker._P.T, rtol=1e-9, atol=1e-12)
-    assert np.linalg.eigvalsh(track.tracker._P)[0] > 0.0
+    assert np.allclose(track.tracker.P, track.tracker.P.T, rtol=1e-9, atol=1e-12)
+    assert np.linalg.eigvalsh(track.tracker.P)[0] > 0.0
 
 
 def walk_by_its_own_model(seed: int, rounds: int) -> tuple[float, float]:

@@ -15,7 +15,8 @@ from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason, Source
 from mine_loc_uwb.fix import FixStatus
 from mine_loc_uwb.parameters import RANGE_METHODS, UwbSolverParameters
-from mine_loc_uwb.round_solver import MeasuredRange, RoundSolver
+from mine_loc_uwb.range_intake import MeasuredRange
+from mine_loc_uwb.round_solver import RoundSolver
 from mine_loc_uwb.solvers import RANGE_SOLVERS
 
 
@@ -48,9 +49,9 @@ def test_an_anchor_that_the_site_does_not_know_is_told_and_not_used():
 
 def test_a_disabled_anchor_is_left_out_until_it_is_enabled():
     rounds = Rounds(solver())
-    rounds.subject.disabled.add(2)
+    rounds.subject.intake.disabled.add(2)
     assert reasons(rounds.solve(ranges())[1])[1] is Reason.DISABLED
-    rounds.subject.disabled.clear()
+    rounds.subject.intake.disabled.clear()
     assert reasons(rounds.solve(ranges())[1])[1] is Reason.ACCEPTED
 
 
@@ -224,7 +225,7 @@ def test_every_arrival_of_a_blink_gets_a_verdict_of_its_source():
     subject = solver()
     arrivals = [replace(item, range_m=item.range_m - ranges()[0].range_m) for item in ranges()]
     arrivals += [MeasuredRange(2, 1.0, 0.01), MeasuredRange(99, 1.0, 0.01), MeasuredRange(4, math.nan, 0.01)]
-    subject.disabled.add(3)
+    subject.intake.disabled.add(3)
     _, verdicts = subject.solve_blink(7, NOW_NS, NOW_NS, arrivals, 1.0)
     assert {verdict.source for verdict in verdicts} == {Source.TDOA}
     assert [verdict.sensor_id for verdict in verdicts] == [item.anchor_id for item in arrivals]

@@ -9,7 +9,7 @@ from mine_loc_interfaces.msg import TdoaArray, TdoaDifference, UwbPose, UwbRange
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
 from mine_loc_uwb.fix import Fix, FixStatus, no_fix
 from mine_loc_uwb.nodes.solver_messages import measured_arrivals, measured_ranges, to_pose
-from mine_loc_uwb.round_solver import MeasuredRange
+from mine_loc_uwb.range_intake import MeasuredRange
 
 
 def test_a_round_s_ranges_keep_their_order_and_what_is_known_of_them():

@@ -9,9 +9,9 @@ from uwb_rounds import NOW_NS, PLACES, Rounds, noisy, ranges, reasons, solver
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason
-from mine_loc_uwb import round_solver
+from mine_loc_uwb import range_intake, round_solver
 from mine_loc_uwb.parameters import RANGE_METHODS
-from mine_loc_uwb.round_solver import MeasuredRange
+from mine_loc_uwb.range_intake import MeasuredRange
 
 # Stamps.
 
@@ -95,7 +95,7 @@ def pull_m(told, rule=math.nan):
         for _ in range(10):
             rounds.solve(noisy(rng))
         for probability, ago_ns in told:
-            rounds.subject.link_state(7, 1, rounds.stamp_ns + NS_PER_S // 10 - ago_ns, probability)
+            rounds.subject.intake.link_state(7, 1, rounds.stamp_ns + NS_PER_S // 10 - ago_ns, probability)
         measured = noisy(rng)
         measured[0] = MeasuredRange(1, measured[0].range_m + late_m, 0.01, los_probability=rule)
         fixes.append(rounds.solve(measured)[0].position_m)
@@ -125,35 +125,38 @@ def test_what_is_no_probability_is_no_judgement(probability):
 
 
 def test_the_tag_heard_longest_ago_makes_room_when_there_are_too_many(monkeypatch):
-    monkeypatch.setattr(round_solver, "_MOST_TAGS", 5)
+    monkeypatch.setattr(round_solver, "MOST_TAGS", 5)
+    monkeypatch.setattr(range_intake, "MOST_TAGS", 5)
     rounds = Rounds(solver(method="least_squares"))
     for tag in range(1, 6):
         rounds.solve(ranges(), tag=tag)
     rounds.solve(ranges(), tag=1)
     rounds.solve(ranges(), tag=99)
     assert sorted(tag for tag, _ in rounds.subject._tags) == [1, 3, 4, 5, 99]
+    assert sorted(tag for tag, _ in rounds.subject.intake._repeated) == [1, 3, 4, 5, 99]
 
 
 def test_memory_of_link_states_is_bounded_and_never_locks_a_tag_out(monkeypatch):
-    monkeypatch.setattr(round_solver, "_MOST_TAGS", 5)
+    monkeypatch.setattr(range_intake, "MOST_TAGS", 5)
     subject = solver()
     for tag in range(1, 20):
-        subject.link_state(tag, 1, NOW_NS, 0.3)
-    assert sorted(subject._link_states) == [15, 16, 17, 18, 19]
-    subject.link_state(15, 1, NOW_NS, 0.9)
-    assert subject._link_states[15][1][0] == 0.9
-    subject.link_state(15, 999, NOW_NS, 0.9)
-    assert 999 not in subject._link_states[15]
+        subject.intake.link_state(tag, 1, NOW_NS, 0.3)
+    assert sorted(subject.intake._link_states) == [15, 16, 17, 18, 19]
+    subject.intake.link_state(15, 1, NOW_NS, 0.9)
+    assert subject.intake._link_states[15][1][0] == 0.9
+    subject.intake.link_state(15, 999, NOW_NS, 0.9)
+    assert 999 not in subject.intake._link_states[15]
 
 
 def test_nothing_is_kept_of_a_forgotten_tag():
     rounds = Rounds(solver())
     rounds.solve(ranges())
     rounds.subject.solve_blink(7, rounds.stamp_ns, rounds.stamp_ns, ranges(), 1.0)
-    rounds.subject.link_state(7, 1, NOW_NS, 0.3)
+    rounds.subject.intake.link_state(7, 1, NOW_NS, 0.3)
     rounds.subject.forget(7)
     assert not rounds.subject._tags
-    assert not rounds.subject._link_states
+    assert not rounds.subject.intake._repeated
+    assert not rounds.subject.intake._link_states
 
 
 def test_a_hundred_tags_are_tracked_side_by_side():

@@ -53,7 +53,7 @@ def test_prediction_is_that_of_the_continuous_model(seed, dimensions, links, gon
     x, P = state(seed, dimensions, links)
     F, Q = van_loan(dimensions, links, gone_s)
     expected_x, expected_P = F @ x, F @ P @ F.T + Q
-    kernel.predict(x, P, dimensions, gone_s, NOISE)
+    kernel.predict(x, P, dimensions, 2 * dimensions + 1, gone_s, NOISE)
     assert x == pytest.approx(expected_x, rel=1e-9, abs=1e-12)
     assert pytest.approx(expected_P, rel=1e-6, abs=1e-9) == P
 
@@ -63,7 +63,7 @@ def test_prediction_is_that_of_the_continuous_model(seed, dimensions, links, gon
 def test_prediction_keeps_the_covariance_symmetric_and_positive(seed, dimensions, steps_s):
     x, P = state(seed, dimensions, 3)
     for gone_s in steps_s:
-        kernel.predict(x, P, dimensions, gone_s, NOISE)
+        kernel.predict(x, P, dimensions, 2 * dimensions + 1, gone_s, NOISE)
     assert pytest.approx(P.T, rel=1e-12, abs=1e-15) == P
     assert np.linalg.eigvalsh(P)[0] > 0.0
 
@@ -71,7 +71,7 @@ def test_prediction_keeps_the_covariance_symmetric_and_positive(seed, dimensions
 def test_left_alone_biases_return_to_nothing_known():
     x, P = state(1, 2, 2)
     x[4:] = 1.0
-    kernel.predict(x, P, 2, 1e4, NOISE)
+    kernel.predict(x, P, 2, 5, 1e4, NOISE)
     assert x[4:] == pytest.approx(0.0, abs=1e-9)
     assert np.diag(P)[4:] == pytest.approx([SETTINGS.common_bias_sd_m**2] + 2 * [SETTINGS.bias_sd_m**2])
 
@@ -92,8 +92,8 @@ def take(
     fresh=1.0,
 ):
     return kernel.take_range(
-        x, P, dimensions, np.asarray(anchor, float), slot, range_m, variance, since_s, 1.0, nlos, SETTINGS.nlos_scale_m,
-        fresh, reach_m, gate, np.empty((3, len(x))),
+        x, P, dimensions, 2 * dimensions + 1, np.asarray(anchor, float), slot, range_m, variance, since_s, 1.0, nlos,
+        SETTINGS.nlos_scale_m, fresh, reach_m, gate, np.empty((3, len(x))),
     )  # fmt: skip
 
 
@@ -164,13 +164,14 @@ def test_a_range_believed_obstructed_pulls_less_than_one_believed_clear():
 
 
 def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_unknown=0, gate=15.0):
-    """A round of ranges of the room; codes, deviances and quality."""
+    """A round of ranges of the room, `gone_s` after the last; codes, deviances and quality."""
     count = len(ranges)
+    kernel.predict(x, P, 2, 5, gone_s, NOISE)
     codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(tracker_round.QUALITIES)
     tracker_round.take_round(
-        x, P, 2, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count), 1.0,
-        np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos, gone_s,
-        offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((3, 3)),
+        x, P, 2, 5, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count),
+        1.0, np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos,
+        gone_s, offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((3, 3)),
     )  # fmt: skip
     return codes, deviances, quality
 
@@ -226,9 +227,14 @@ def test_belief_in_an_obstruction_fades_to_the_share_of_obstructed_links_while_t
 
 @pytest.mark.parametrize(("los", "low", "high"), [(0.0, 0.97, 0.97), (1.0, 0.01, 0.01), (0.5, 0.5, 0.5)])
 def test_a_judgement_of_the_link_shifts_the_belief_within_its_bounds(los, low, high):
-    assert low <= tracker_round._shifted(0.5, los) <= high
+    assert low <= tracker_round._shifted(0.5, los, 1.0) <= high
 
 
 def test_no_judgement_leaves_the_belief():
-    assert tracker_round._shifted(0.3, math.nan) == 0.3
-    assert tracker_round._shifted(0.3, 0.8) == pytest.approx(0.3 * 0.2 / (0.3 * 0.2 + 0.7 * 0.8))
+    assert tracker_round._shifted(0.3, math.nan, 1.0) == 0.3
+    assert tracker_round._shifted(0.3, 0.8, 1.0) == pytest.approx(0.3 * 0.2 / (0.3 * 0.2 + 0.7 * 0.8))
+
+
+def test_odds_of_a_judgement_count_by_their_weight():
+    odds = [tracker_round._shifted(0.5, 0.8, weight) for weight in (0.0, 0.5, 1.0)]
+    assert [value / (1.0 - value) for value in odds] == pytest.approx([1.0, 0.5, 0.25])

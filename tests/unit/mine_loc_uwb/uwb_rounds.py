@@ -5,7 +5,8 @@ import math
 from mine_loc_core.site import Anchor
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_uwb.parameters import UwbSolverParameters
-from mine_loc_uwb.round_solver import MeasuredRange, RoundSolver
+from mine_loc_uwb.range_intake import MeasuredRange
+from mine_loc_uwb.round_solver import RoundSolver
 
 PLACES = {1: (0.0, 0.0, 2.4), 2: (60.0, 2.0, 2.4), 3: (58.0, 45.0, 2.4), 4: (1.0, 46.0, 2.4), 5: (30.0, 20.0, 2.4)}
 TAG = (20.0, 12.0, 1.0)

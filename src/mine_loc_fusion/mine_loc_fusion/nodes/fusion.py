@@ -9,23 +9,37 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from mine_loc_interfaces import msg
-from mine_loc_interfaces.srv import Reset
+from mine_loc_interfaces.srv import Reset, SetPose, ToggleSensor
 from tf2_msgs.msg import TFMessage
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_time
+from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import to_ns
-from mine_loc_fusion.estimate import Estimate
-from mine_loc_fusion.nodes.messages import los_fraction, to_inputs, to_person_pose, to_transform
+from mine_loc_core.verdicts import Source
+from mine_loc_fusion.estimate import Estimate, is_position
+from mine_loc_fusion.nodes.messages import (
+    los_fraction,
+    to_inputs,
+    to_person_pose,
+    to_place,
+    to_region,
+    to_transform,
+)
 from mine_loc_fusion.parameters import FusionParameters
+from mine_loc_fusion.tightly_coupled import rehearse
 from mine_loc_fusion.tracked_person import TrackedPerson
+from mine_loc_uwb.anchor_frame import anchor_frame
+from mine_loc_uwb.range_correction_file import load_range_correction
+from mine_loc_uwb.range_intake import RangeIntake
 
 _PERIOD_S = 1.0
+_PRESENT = (msg.CoarseRegion.NEW, msg.CoarseRegion.KEPT)
+_SOURCES = (Source.RANGE, Source.TDOA, Source.UWB_POSE, Source.STEP, Source.LANDMARK, Source.REGION)
 
 
 class Fusion(NodeBase):
@@ -41,6 +55,11 @@ class Fusion(NodeBase):
         folder = Path(self.parameters.site)
         self._site = load_site(folder)
         self._people = PeopleFile(folder)
+        self._served = {name.strip() for name in self.parameters.people.split(",") if name.strip()}
+        chosen = self.parameters.range_correction
+        correction = load_range_correction(folder / chosen) if chosen else None
+        anchors = anchor_frame(self._site, self._site.map_frame).anchors
+        self._intake = RangeIntake(anchors, self.parameters.max_range_m, correction)
         self._tracked: dict[str, TrackedPerson] = {}
         self._pose_publishers: dict[str, object] = {}
         self._array = self.publish_to(msg.PersonPoseArray, "fused/poses", EVENTS)
@@ -49,9 +68,16 @@ class Fusion(NodeBase):
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
         self._take_people()
         self.serve(Reset, "~/reset", self._reset)
+        self.serve(SetPose, "~/set_pose", self._set_pose)
+        self.serve(ToggleSensor, "~/toggle_sensor", self._toggle_sensor)
         self.every(self.parameters.coast_period_s, self._coast)
         self.every(_PERIOD_S, self._each_second)
         self.subscribe(msg.Epoch, "sync/epochs", self._on_epoch, EVENTS)
+        self.subscribe(msg.CoarseRegionArray, "coarse/regions", self._on_regions, EVENTS)
+
+    def activate(self) -> None:
+        """Compile what the first epoch would wait for."""
+        rehearse(self._site.dimensions)
 
     def parameters_changed(self) -> None:
         """New parameters start new estimators."""
@@ -60,6 +86,7 @@ class Fusion(NodeBase):
 
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Estimates rest on stamps that no longer hold."""
+        self._intake.reset()
         for tracked in self._tracked.values():
             tracked.reset()
 
@@ -74,12 +101,16 @@ class Fusion(NodeBase):
     def _take_people(self) -> None:
         people = self._people.people
         for name in [name for name in self._tracked if people.by_name(name) is None]:
-            del self._tracked[name]
+            self._intake.forget(self._tracked.pop(name).person.tag_id)
             self.release(self._pose_publishers.pop(name))
         for person in people:
+            if self._served and person.name not in self._served:
+                continue
             tracked = self._tracked.get(person.name)
             if tracked is None:
-                self._tracked[person.name] = TrackedPerson(person, self.parameters)
+                self._tracked[person.name] = TrackedPerson(
+                    person, self.parameters, self._site.tag_height_m if self._site.dimensions == 3 else None
+                )
             else:
                 tracked.person = person
             if person.name not in self._pose_publishers:
@@ -91,8 +122,9 @@ class Fusion(NodeBase):
         if tracked is None:
             return
         started = time.perf_counter()
-        inputs = to_inputs(epoch)
-        verdicts = tracked.update(inputs, late=epoch.late)
+        height_m = None if self._site.dimensions == 3 else self._height_m(tracked)
+        inputs, refused = to_inputs(epoch, self._intake, height_m, self.parameters.arrival_sd_m**2)
+        verdicts = refused + tracked.update(inputs, late=epoch.late)
         tracked.costs_s.append(time.perf_counter() - started)
         if epoch.ranges:
             tracked.los_fraction = los_fraction(epoch)
@@ -104,6 +136,19 @@ class Fusion(NodeBase):
             self._verdicts.publish(to_verdict_array(verdicts, stamp, frame, person=epoch.person))
         if not epoch.late:
             self._publish([tracked], inputs.stamp_ns)
+
+    def _on_regions(self, regions: msg.CoarseRegionArray) -> None:
+        """A region places a person of whom nothing better is known, and bounds one who has been silent for long."""
+        for region in regions.regions:
+            tracked = self._tracked.get(region.person)
+            if tracked is None or region.status not in _PRESENT:
+                continue
+            stamp_ns = to_stamp_ns(regions.header.stamp)
+            verdicts = tracked.use_region(stamp_ns, to_region(region))
+            if verdicts:
+                array = to_verdict_array(verdicts, regions.header.stamp, self._site.map_frame, person=region.person)
+                self._verdicts.publish(array)
+                self._publish([tracked], stamp_ns)
 
     def _coast(self) -> None:
         """Whoever was not heard of lately is published from prediction, so that the output never stops."""
@@ -124,7 +169,9 @@ class Fusion(NodeBase):
         transforms = TFMessage()
         for tracked, estimate in outputs:
             person = tracked.person
-            pose = to_person_pose(person.name, person.tag_id, estimate, self._height_m(tracked), tracked.los_fraction)
+            height_m = self._height_m(tracked) if estimate.height_m is None else estimate.height_m
+            mode = tracked.mode_of(estimate)
+            pose = to_person_pose(person.name, person.tag_id, estimate, height_m, tracked.los_fraction, mode)
             array.people.append(pose)
             stamped = PoseWithCovarianceStamped(pose=pose.pose)
             stamped.header.frame_id = self._site.map_frame
@@ -179,6 +226,29 @@ class Fusion(NodeBase):
         message.header.stamp = to_time(now_ns)
         message.header.frame_id = self._site.map_frame
         return message
+
+    def _set_pose(self, request: SetPose.Request) -> tuple[bool, str]:
+        tracked = self._tracked.get(request.person)
+        if tracked is None:
+            return False, f"nobody called {request.person!r}; known: {', '.join(self._tracked)}"
+        frame, stamp_ns = request.pose.header.frame_id, to_stamp_ns(request.pose.header.stamp)
+        if frame != self._site.map_frame:
+            return False, f"frame {frame!r}; allowed: {self._site.map_frame}"
+        position_m, covariance_m2 = to_place(request.pose.pose)
+        if not is_position(position_m, covariance_m2):
+            return False, "pose: not a place with a covariance; allowed: finite, positive definite in x and y"
+        tracked.begin(stamp_ns or self.now_ns(), position_m, covariance_m2, None)
+        return True, f"{request.person} is at {position_m[0]:.2f}, {position_m[1]:.2f}"
+
+    def _toggle_sensor(self, request: ToggleSensor.Request) -> tuple[bool, str]:
+        if request.person and request.person not in self._tracked:
+            return False, f"nobody called {request.person!r}; known: {', '.join(self._tracked)}"
+        if request.source not in _SOURCES:
+            return False, f"source {request.source}; allowed: {', '.join(f'{s.value} {s.name}' for s in _SOURCES)}"
+        source = Source(request.source)
+        for tracked in [self._tracked[request.person]] if request.person else self._tracked.values():
+            (tracked.disabled.discard if request.enabled else tracked.disabled.add)(source)
+        return True, f"{source.name} is {'used' if request.enabled else 'left out'}"
 
     def _reset(self, request: Reset.Request) -> tuple[bool, str]:
         if request.person and request.person not in self._tracked:

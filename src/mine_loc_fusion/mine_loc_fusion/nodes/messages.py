@@ -7,29 +7,73 @@ from geometry_msgs.msg import PoseWithCovariance, TransformStamped, Vector3
 from mine_loc_interfaces import msg
 
 from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
-from mine_loc_fusion.estimate import EpochInputs, Estimate, PositionFix, StepFix
-from mine_loc_fusion.pose_filter import ce95_m
+from mine_loc_core.verdicts import Reason, Source, Verdict
+from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PlaceFix, PositionFix, StepFix, ce95_m
+from mine_loc_fusion.mode import Mode
+from mine_loc_uwb.nodes.solver_messages import measured_arrivals, measured_ranges
+from mine_loc_uwb.range_intake import RangeIntake
 
 _UNKNOWN_VARIANCE = 1e6
 _HEIGHT_VARIANCE_M2 = 0.3**2
 
 
-def to_inputs(epoch: msg.Epoch) -> EpochInputs:
-    """What the estimator uses of an epoch; poses without a position stay out (their verdict is the solver's)."""
-    return EpochInputs(
-        to_stamp_ns(epoch.header.stamp),
-        tuple(_to_position(pose) for pose in epoch.uwb_poses if pose.status == msg.UwbPose.OK),
-        tuple(
+def to_inputs(
+    epoch: msg.Epoch, intake: RangeIntake, height_m: float | None, arrival_variance_m2: float
+) -> tuple[EpochInputs, tuple[Verdict, ...]]:
+    """What the estimator uses of an epoch, and verdicts on the ranges that are none.
+
+    Poses without a position stay out (their verdict is the solver's), and turns that match no marker. `height_m`: of
+    the tag, None = solve for it; `arrival_variance_m2`: of arrivals of a blink whose own is unknown.
+    """
+    stamp_ns = to_stamp_ns(epoch.header.stamp)
+    for state in epoch.link_states:
+        if state.method != msg.LinkState.METHOD_POWER_RULE:  # the range brings what its powers say
+            intake.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
+    rounds = [(array.tag_id, measured_ranges(array), Source.RANGE) for array in epoch.ranges]
+    rounds += [(array.tag_id, measured_arrivals(array, arrival_variance_m2), Source.TDOA) for array in epoch.tdoa]
+    taken, refused = [], []
+    for tag_id, items, source in rounds if intake.anchors else ():
+        measurements, reasons = intake.take(tag_id, stamp_ns, items, height_m, source)
+        taken.append(measurements)
+        refused += [
+            Verdict(source, item.anchor_id, reason)
+            for item, reason in zip(items, reasons, strict=True)
+            if reason is not Reason.ACCEPTED
+        ]
+    los = los_fraction(epoch)
+    inputs = EpochInputs(
+        stamp_ns,
+        positions=tuple(_to_position(pose, los) for pose in epoch.uwb_poses if pose.status == msg.UwbPose.OK),
+        steps=tuple(
             StepFix(step.length, step.length_variance, step.heading, step.heading_variance, step.interval)
             for step in epoch.steps
         ),
+        ranges=tuple(measurements for measurements in taken if len(measurements)),
+        places=tuple(_to_place(fix) for fix in epoch.landmark_fixes if fix.verdict == msg.LandmarkFix.MATCHED),
     )
+    return inputs, tuple(refused)
 
 
-def _to_position(pose: msg.UwbPose) -> PositionFix:
-    position = pose.pose.pose.position
-    covariance = np.asarray(pose.pose.covariance).reshape(6, 6)
-    return PositionFix(np.array([position.x, position.y]), covariance[:2, :2].copy())
+def _to_position(pose: msg.UwbPose, los: float) -> PositionFix:
+    return PositionFix(*to_place(pose.pose), los)
+
+
+def to_place(pose: PoseWithCovariance) -> tuple[Array, Array]:
+    """Horizontal position (2,) and its covariance (2, 2)."""
+    position = pose.pose.position
+    covariance: Array = np.asarray(pose.covariance).reshape(6, 6)[:2, :2].copy()
+    return np.array([position.x, position.y]), covariance
+
+
+def _to_place(fix: msg.LandmarkFix) -> PlaceFix:
+    covariance = np.asarray(fix.position_covariance).reshape(3, 3)
+    return PlaceFix(Source.LANDMARK, np.array([fix.position.x, fix.position.y]), covariance[:2, :2].copy())
+
+
+def to_region(region: msg.CoarseRegion) -> PlaceFix:
+    """A coarse region as a place."""
+    covariance = np.asarray(region.covariance).reshape(2, 2).copy()
+    return PlaceFix(Source.REGION, np.array([region.center.x, region.center.y]), covariance)
 
 
 def los_fraction(epoch: msg.Epoch) -> float:
@@ -40,7 +84,9 @@ def los_fraction(epoch: msg.Epoch) -> float:
     return float(np.mean(judged)) if judged else math.nan
 
 
-def to_person_pose(name: str, tag_id: int, estimate: Estimate, height_m: float, los: float) -> msg.PersonPose:
+def to_person_pose(
+    name: str, tag_id: int, estimate: Estimate, height_m: float, los: float, mode: Mode
+) -> msg.PersonPose:
     """One person's entry; yaw is that of motion when the person moves, else unknown."""
     message = msg.PersonPose(
         person=name,
@@ -49,7 +95,7 @@ def to_person_pose(name: str, tag_id: int, estimate: Estimate, height_m: float, 
         pose=to_pose(estimate, height_m),
         velocity=Vector3(x=float(estimate.velocity_ms[0]), y=float(estimate.velocity_ms[1])),
         horizontal_ce95=ce95_m(estimate.covariance[:2, :2]),
-        mode=int(estimate.mode),
+        mode=int(mode),
         since_uwb=estimate.since_uwb_s,
         since_step=estimate.since_step_s,
         los_fraction=los,

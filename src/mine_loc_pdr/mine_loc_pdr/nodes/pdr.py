@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import TransformStamped
-from mine_loc_interfaces.msg import Step, StrideUpdate, UwbPose
-from mine_loc_interfaces.srv import Reset
+from mine_loc_interfaces.msg import Activity as ActivityMessage
+from mine_loc_interfaces.msg import LandmarkFix, Step, StrideUpdate, UwbPose
+from mine_loc_interfaces.srv import Reset, SetPose
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
 from std_msgs.msg import Header
@@ -21,9 +22,17 @@ from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
+from mine_loc_core.site import Site, load_site
 from mine_loc_core.stamps import NS_PER_S
-from mine_loc_pdr.dead_reckoning import OdometryPose, PedestrianDeadReckoning, StepEvent
+from mine_loc_core.walkable_area import WalkableArea
+from mine_loc_pdr.activity import Activity, ActivityModel, ActivityRecogniser
+from mine_loc_pdr.activity_model_file import load_model, shipped_model
+from mine_loc_pdr.dead_reckoning import ImuSample, OdometryPose, PedestrianDeadReckoning, StepEvent
+from mine_loc_pdr.gallery_constraint import GalleryConstraint
+from mine_loc_pdr.nodes.landmark_messages import to_landmark_fix, to_map_pose
 from mine_loc_pdr.parameters import PdrParameters
+from mine_loc_pdr.plane_follower import PlaneFollower
+from mine_loc_pdr.pseudo_plane import PseudoPlane
 from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
 from mine_loc_pdr.stride import stride_model
 from mine_loc_pdr.stride_refinement import Fix, StrideRefiner, StrideScale
@@ -39,10 +48,12 @@ _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says noth
 class Track:
     """One person's dead reckoning and the ends of its topics."""
 
-    def __init__(self, person: Person, n100: N100) -> None:
+    def __init__(self, person: Person, n100: N100, activities: ActivityModel, site: Site) -> None:
         self.person = person
         self._n100 = n100
         self.entities: list[Any] = []  # what is released with the track
+        self._activities = activities
+        self._site = site
         self.odometry: Any = None
         self.heard_s = time.monotonic()
         self.field_heard_s = -math.inf
@@ -56,13 +67,23 @@ class Track:
         stride = stride_model(self.person)
         self.pdr = PedestrianDeadReckoning(stride, (float(x), float(y), float(z)))
         self.refiner = StrideRefiner(stride.scale, stride.scale_variance)
+        self._recogniser = ActivityRecogniser(self._activities)
+        area = WalkableArea.of(self._site)
+        self.plane = PlaneFollower(
+            PseudoPlane(self._site.turn_markers), None if area is None else GalleryConstraint(area)
+        )
         self.published_period = 0
         self.mounting_yaw_rad: float | None = None  # as last published
         self.samples = 0
 
+    def recognise(self, sample: ImuSample) -> Activity | None:
+        """The activity of the window that ends with a sample which dead reckoning has taken."""
+        heading_rad = self.pdr.heading_rad
+        return None if heading_rad is None else self._recogniser.push(sample.stamp_ns, heading_rad, sample.force_m_s2)
+
 
 class Pdr(NodeBase):
-    """Publishes pdr/steps, pdr/stride_updates, <person>/odometry and the transforms of base_link and imu_link."""
+    """Publishes pdr/steps, activity, landmark_fix and stride_updates, each <person>/odometry and its transforms."""
 
     parameter_class = PdrParameters
 
@@ -72,10 +93,15 @@ class Pdr(NodeBase):
     def configure(self) -> None:
         """Read the people and listen to each who wears an N100."""
         self._tracks: dict[str, Track] = {}
+        self._site = load_site(Path(self.parameters.site))
         self._file = PeopleFile(Path(self.parameters.site))
+        model = self.parameters.activity_model
+        self._activity_model, _ = load_model(Path(model) if model else shipped_model())
+        self._activities = self.publish_to(ActivityMessage, "pdr/activity", EVENTS)
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
         self._strides = self.publish_to(StrideUpdate, "pdr/stride_updates", EVENTS)
         self.subscribe(UwbPose, "uwb/pose", self._on_uwb_pose, EVENTS)
+        self._landmark_fixes = self.publish_to(LandmarkFix, "pdr/landmark_fix", EVENTS)
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
         self._tf_static = self.publish_to(TFMessage, "/tf_static", LATCHED)
         self._follow(self._file.people)
@@ -83,6 +109,7 @@ class Pdr(NodeBase):
         self.every(_PEOPLE_PERIOD_S, self._poll_people)
         self.every(_MOUNTING_PERIOD_S, self._publish_mountings)
         self.serve(Reset, "~/reset", self._reset)
+        self.serve(SetPose, "~/set_pose", self._set_pose)
 
     def parameters_changed(self) -> None:
         """Work out the period of the odometry."""
@@ -111,7 +138,7 @@ class Pdr(NodeBase):
                 self._tracks[name] = self._new_track(person, person.n100)
 
     def _new_track(self, person: Person, n100: N100) -> Track:
-        track = Track(person, n100)
+        track = Track(person, n100, self._activity_model, self._site)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
         name = f"/{person.name}/imu"
         imu = self.subscribe(Imu, f"{name}/data", lambda message: self._on_imu(track, message), STREAM, raw=True)
@@ -129,6 +156,9 @@ class Pdr(NodeBase):
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
             self._refine_stride(track, step)
+        if (activity := track.recognise(sample)) is not None:
+            self._activities.publish(_activity(track.person.name, activity))
+        self._follow_plane(track, sample.stamp_ns, step)
         period = sample.stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
@@ -152,6 +182,12 @@ class Pdr(NodeBase):
     def _on_field(self, track: Track, message: bytes) -> None:
         track.pdr.push_field(field_sample(message))
         track.field_heard_s = time.monotonic()
+
+    def _follow_plane(self, track: Track, stamp_ns: int, step: StepEvent | None) -> None:
+        if (heading_rad := track.pdr.heading_rad) is None:
+            return
+        if (fix := track.plane.push(stamp_ns, heading_rad, step)) is not None:
+            self._landmark_fixes.publish(to_landmark_fix(fix, track.person.name, self._site.map_frame))
 
     def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
         name = track.person.name
@@ -201,6 +237,16 @@ class Pdr(NodeBase):
             self._tracks[name].restart()
         return True, f"restarted: {', '.join(chosen) or 'nobody'}"
 
+    def _set_pose(self, request: Any) -> tuple[bool, str]:
+        track = self._tracks.get(request.person)
+        if track is None:
+            return False, f"{request.person!r}: wears no N100; known: {', '.join(self._tracks) or 'nobody'}"
+        pose = to_map_pose(request.pose, self._site.map_frame)
+        refusal = track.plane.set_pose(pose, track.refiner.known.variance, track.pdr.bias_sd_rad_s)
+        if refusal is not None:
+            return False, f"{request.person}: {refusal}"
+        return True, f"{request.person} is followed from there"
+
     def _track_health(self, track: Track) -> Health:
         name, pdr, silent_s = track.person.name, track.pdr, time.monotonic() - track.heard_s
         faults = sum(pdr.faults.values())
@@ -218,6 +264,7 @@ class Pdr(NodeBase):
         if front is not None:
             values["front_yaw_deg"] = f"{math.degrees(front.yaw_rad):.0f}"
             values["front_yaw_sd_deg"] = f"{math.degrees(math.sqrt(front.variance_rad2)):.0f}"
+        values |= {f"landmark_{name}": count for name, count in track.plane.counts.items()}
         if silent_s > _SILENT_S:
             return Health(name, Level.ERROR, f"no samples for {silent_s:.1f} s", values)
         if new_faults:
@@ -257,6 +304,17 @@ def _stride_update(person: Person, stamp_ns: int, found: StrideScale) -> StrideU
 
 def _differs(yaw_rad: float, published_rad: float | None) -> bool:
     return published_rad is None or abs(math.remainder(yaw_rad - published_rad, math.tau)) > _MOUNTING_MOVED_RAD
+
+
+def _activity(person: str, activity: Activity) -> ActivityMessage:
+    return ActivityMessage(
+        header=Header(stamp=to_time(activity.stamp_ns), frame_id=f"{person}/odom"),
+        person=person,
+        activity=int(activity.kind),
+        probability=activity.probability,
+        window=activity.window_s,
+        turn_angle=activity.turn_rad,
+    )
 
 
 def _covariance(pose: OdometryPose) -> list[float]:

@@ -7,7 +7,7 @@ from mine_loc_interfaces.msg import TdoaArray, UwbPose, UwbRange, UwbRangeArray
 
 from mine_loc_core.nodes.conversions import to_point
 from mine_loc_uwb.fix import Fix
-from mine_loc_uwb.round_solver import MeasuredRange
+from mine_loc_uwb.range_intake import MeasuredRange
 
 
 def measured_ranges(array: UwbRangeArray) -> list[MeasuredRange]:

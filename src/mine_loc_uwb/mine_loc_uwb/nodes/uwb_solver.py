@@ -82,7 +82,7 @@ class UwbSolver(NodeBase):
     def health(self) -> Iterable[Health]:
         """How many rounds gave a position, and what was refused."""
         figures: dict[str, object] = {"rounds": self._rounds, "fixes": self._fixes}
-        figures["disabled_anchors"] = sorted(self._solver.disabled)
+        figures["disabled_anchors"] = sorted(self._solver.intake.disabled)
         figures |= {f"refused_{reason}": count for reason, count in sorted(self._refused.items())}
         yield Health("solver", Level.OK, self.parameters.method, figures)
         if self._people.error:
@@ -110,7 +110,7 @@ class UwbSolver(NodeBase):
     def _on_link_state(self, state: LinkState) -> None:
         if state.method != LinkState.METHOD_POWER_RULE:  # the range brings what its powers say
             stamp_ns = to_stamp_ns(state.header.stamp)
-            self._solver.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
+            self._solver.intake.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
 
     def _publish(
         self, fix: Fix | None, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str
@@ -133,9 +133,11 @@ class UwbSolver(NodeBase):
         return person.tag_height_m
 
     def _set_anchor_enabled(self, request: SetAnchorEnabled.Request) -> tuple[bool, str]:
-        if request.anchor_id not in self._solver.anchors:
-            return False, f"no anchor {request.anchor_id}; known: {sorted(self._solver.anchors)}"
-        (self._solver.disabled.discard if request.enabled else self._solver.disabled.add)(request.anchor_id)
+        if request.anchor_id not in self._solver.intake.anchors:
+            return False, f"no anchor {request.anchor_id}; known: {sorted(self._solver.intake.anchors)}"
+        (self._solver.intake.disabled.discard if request.enabled else self._solver.intake.disabled.add)(
+            request.anchor_id
+        )
         self._publish_map()
         return True, f"anchor {request.anchor_id} is {'used' if request.enabled else 'left out'}"
 
@@ -153,7 +155,7 @@ class UwbSolver(NodeBase):
                     position=to_point(anchor.position_m),
                     position_covariance=[variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance],
                     range_offset=anchor.range_offset_m,
-                    enabled=anchor.id not in self._solver.disabled,
+                    enabled=anchor.id not in self._solver.intake.disabled,
                 )
             )
         self._map.publish(message)

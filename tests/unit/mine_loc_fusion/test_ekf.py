@@ -1,4 +1,4 @@
-"""The pose filter: where, how sure, on what it rests; never NaN, never surer than it may be."""
+"""The extended Kalman filter: where, how sure, on what it rests; never NaN, never surer than it may be."""
 
 import itertools
 import math
@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
 from mine_loc_core.verdicts import Reason, Source
-from mine_loc_fusion.estimate import EpochInputs, Mode, PositionFix, StepFix
-from mine_loc_fusion.parameters import FusionParameters
-from mine_loc_fusion.pose_filter import PoseFilter
+from mine_loc_fusion.ekf import Ekf, EkfSettings
+from mine_loc_fusion.estimate import EpochInputs, PositionFix, StepFix
+from mine_loc_fusion.mode import Mode, ModeLimits, mode_of
 
+LIMITS = ModeLimits(uwb_timeout_s=1.0, step_timeout_s=2.0, lost_ce95_m=50.0)
 T0 = 1_760_000_000 * NS_PER_S
 
 
@@ -34,7 +35,7 @@ def position(subject, seconds, x, y, sd=0.1):
 
 
 def standing(seconds=5.0, **parameters):
-    subject = PoseFilter(FusionParameters(**parameters))
+    subject = Ekf(EkfSettings(**parameters))
     for i in range(round(seconds * 10)):
         position(subject, i / 10, 3.0, 4.0)
     return subject
@@ -43,7 +44,7 @@ def standing(seconds=5.0, **parameters):
 def walk(seconds, *, yaw, seed=0, steps=True, drop=lambda _: False, sd=0.1):
     """Along an L at 1.2 m/s: ten positions and two steps a second; the odom frame is turned by −yaw."""
     rng = np.random.default_rng(seed)
-    subject, errors = PoseFilter(FusionParameters()), []
+    subject, errors = Ekf(), []
     truth = np.zeros(2)
     for i in range(1, round(seconds * 10) + 1):
         direction = 0.0 if i < seconds * 5 else math.pi / 2
@@ -57,19 +58,19 @@ def walk(seconds, *, yaw, seed=0, steps=True, drop=lambda _: False, sd=0.1):
 
 
 def test_before_the_first_position_there_is_no_estimate_and_a_step_does_not_make_one():
-    subject = PoseFilter(FusionParameters())
+    subject = Ekf()
     assert subject.update(EpochInputs(T0, steps=(step(),)))[0].reason is Reason.NOT_INITIALISED
     assert subject.estimate(T0) is None
 
 
 def test_the_first_position_is_taken_as_it_is():
-    subject = PoseFilter(FusionParameters())
+    subject = Ekf()
     verdict = position(subject, 0, 3, 4, sd=0.5)
     estimate = subject.estimate(T0)
     assert verdict.accepted
     assert estimate.position_m == pytest.approx([3, 4])
     assert np.sqrt(np.diag(estimate.covariance)[:2]) == pytest.approx(0.5, rel=0.1)
-    assert (estimate.mode, estimate.since_uwb_s, estimate.since_step_s) == (Mode.UWB_ONLY, 0.0, math.inf)
+    assert (mode_of(estimate, LIMITS), estimate.since_uwb_s, estimate.since_step_s) == (Mode.UWB_ONLY, 0.0, math.inf)
     assert estimate.yaw_offset_rad is None
 
 
@@ -104,7 +105,7 @@ def test_without_inputs_the_covariance_grows_until_the_person_is_lost_and_the_po
     areas = [np.linalg.det(estimate.covariance[:2, :2]) for estimate in estimates]
     assert all(a < b for a, b in itertools.pairwise(areas[:7]))
     assert areas[7] >= areas[6]
-    modes = [estimate.mode for estimate in estimates]
+    modes = [mode_of(estimate, LIMITS) for estimate in estimates]
     assert modes[0] is Mode.UWB_ONLY
     assert modes[3] is Mode.COASTING
     assert modes[-1] is Mode.LOST
@@ -130,8 +131,8 @@ def test_steps_make_a_walk_more_accurate_while_positions_are_missing_and_the_mod
     without, errors_without = walk(20, yaw=0.7, drop=gap, steps=False)
     assert errors[-1] < 0.5 * errors_without[-1]
     assert errors[-1] < 2.0
-    assert with_steps.estimate(at(20)).mode is Mode.DEAD_RECKONING
-    assert without.estimate(at(20)).mode is Mode.COASTING
+    assert mode_of(with_steps.estimate(at(20)), LIMITS) is Mode.DEAD_RECKONING
+    assert mode_of(without.estimate(at(20)), LIMITS) is Mode.COASTING
 
 
 def test_steps_do_not_spoil_a_walk_with_positions_and_the_mode_tells_them():
@@ -141,7 +142,7 @@ def test_steps_do_not_spoil_a_walk_with_positions_and_the_mode_tells_them():
     with_steps = np.sqrt(np.mean([np.mean(a[1][60:] ** 2) for a, _ in runs]))
     without = np.sqrt(np.mean([np.mean(b[1][60:] ** 2) for _, b in runs]))
     assert with_steps < without
-    assert runs[0][0][0].estimate(at(20)).mode is Mode.UWB_PDR
+    assert mode_of(runs[0][0][0].estimate(at(20)), LIMITS) is Mode.UWB_PDR
 
 
 @pytest.mark.parametrize(
@@ -195,7 +196,7 @@ EPOCH = st.builds(
 @settings(max_examples=60, deadline=None)
 @given(st.lists(EPOCH, max_size=30), st.booleans())
 def test_no_input_makes_the_estimate_nan_or_its_covariance_indefinite(epochs, known):
-    subject = walk(15, yaw=0.3)[0] if known else PoseFilter(FusionParameters())
+    subject = walk(15, yaw=0.3)[0] if known else Ekf()
     for epoch in sorted(epochs, key=lambda e: e.stamp_ns):
         verdicts = subject.update(epoch)
         assert len(verdicts) == len(epoch.positions) + len(epoch.steps)

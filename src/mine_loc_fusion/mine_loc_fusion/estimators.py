@@ -1,0 +1,23 @@
+"""The estimators by name, as the parameter `method` of the fusion node chooses them."""
+
+from collections.abc import Callable, Mapping
+
+from mine_loc_fusion.adaptive_ekf import AdaptiveEkf
+from mine_loc_fusion.ekf import Ekf
+from mine_loc_fusion.estimate import Estimator
+from mine_loc_fusion.los_weighted import LosWeighted, LosWeightedSettings
+from mine_loc_fusion.robust_kf import RobustKf
+from mine_loc_fusion.tightly_coupled import TightlyCoupled
+
+RIVALS: Mapping[str, Callable[[], Estimator]] = {
+    "los_weighted": LosWeighted,
+    "los_weighted_residual": lambda: LosWeighted(LosWeightedSettings(residual_gate=3.0)),
+    "robust_kf": RobustKf,
+    "ekf": Ekf,
+    "adaptive_ekf": AdaptiveEkf,
+}
+
+
+def make_estimator(method: str, height_m: float | None) -> Estimator:
+    """A new estimator of one person; `height_m` as in TightlyCoupled."""
+    return TightlyCoupled(height_m=height_m) if method == "mine_loc" else RIVALS[method]()
