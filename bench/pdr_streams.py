@@ -75,7 +75,7 @@ def _fed(process: psutil.Process, domain: int, names: Sequence[str], samples: Se
         before, started_s = process.cpu_times(), time.monotonic()
         sent = _publish(publishers, fields, [_encoded(sample) for sample in samples])
         lasted_s, done_s = time.monotonic() - started_s, time.time()
-        observer.wait_for(lambda: reports.messages[-1].header.stamp.sec > done_s + 2.0, what="the node's last counts")
+        observer.wait_for(lambda: reports.messages[-1].header.stamp.sec > done_s + 2.0, 120.0, "the last counts")
         after = process.cpu_times()
         taken = sum(observer.value(f"pdr: {name}", "samples") for name in names)
     finally:
