@@ -15,10 +15,8 @@ from scipy.signal import butter, find_peaks, sosfiltfilt
 from mine_loc_pdr.steps import StepThresholds
 
 GRID = tuple(
-    StepThresholds(start_peak_m_s2=start, peak_share=share, valley_m_s2=valley, weak_peak_m_s2=weak)
-    for start, share, valley, weak in itertools.product(
-        (0.8, 1.0, 1.2), (0.1, 0.2, 0.3), (0.01, 0.05), (0.02, 0.04, 0.08, float("inf"))
-    )
+    StepThresholds(start_peak_m_s2=start, peak_share=share, weak_peak_m_s2=weak)
+    for start, share, weak in itertools.product((0.8, 1.0, 1.2), (0.1, 0.2, 0.3), (0.02, 0.04, 0.08, float("inf")))
 )
 NO_WEAK = {"weak_peak_m_s2": float("inf")}
 FIXED_GRID = tuple(

@@ -39,15 +39,15 @@ _FIRST_INTERVAL_S = 0.55  # until a walk has shown its own
 class StepThresholds:
     """Of the smoothed vertical acceleration in m/s², chosen by leave-one-subject-out on ipol_gait_lowerback.
 
-    `python bench/pdr.py --only ipol` repeats the choice of those that matter most: `start_peak_m_s2`, `peak_share`,
-    `valley_m_s2` and `weak_peak_m_s2`.
+    `python bench/pdr.py --only ipol` repeats the choice of the three that matter most: `start_peak_m_s2`, `peak_share`
+    and `weak_peak_m_s2`.
     """
 
     # Shifting one's weight while standing, and the push that begins a walk, also make a peak and a valley.
     start_peak_m_s2: float = 1.0
     peak_m_s2: float = 0.15
     peak_share: float = 0.2  # of the usual peak of this walk
-    valley_m_s2: float = 0.01
+    valley_m_s2: float = 0.05
     weak_peak_m_s2: float = 0.08
     weak_valley_m_s2: float = 0.01
     weak_interval: tuple[float, float] = (0.6, 1.6)  # of the usual interval
