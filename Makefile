@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr lock clean
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -39,6 +39,9 @@ bench-los: setup ## the LOS/NLOS classifier on placements and scenes it never sa
 
 bench-pdr: setup ## dead reckoning on recordings of waists and phones (bench/results/pdr.json)
 	@$(run) python bench/pdr.py
+
+bench-fusion: setup ## fusion against paper A, its rivals and GTSAM (bench/results/fusion.json)
+	@$(run) python bench/fusion.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

@@ -14,21 +14,21 @@ from fusion_paper_a import CHOSEN, SCENE_NAMES, errors_m, rows_of, solved, walk_
 from fusion_walks import scene, seeds
 from rich.progress import track
 
-CANDIDATES = 32
+CANDIDATES = 60
 _EKF = {
     "acceleration_sd": [0.1, 0.2, 0.3, 0.5, 1.0, 2.0],
     "position_sd_m": [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0],
     "step_velocity_sd_ms": [0.05, 0.1, 0.2, 0.3],
 }
 _WEIGHTED = {
-    "los_sd_m": [0.2, 0.5, 1.0, 2.0, 4.0],
-    "nlos_sd_m": [1.0, 3.0, 8.0, 20.0, 50.0],
-    "step_share": [0.02, 0.05, 0.1, 0.2],
-    "rest_sd_m": [0.02, 0.05, 0.1],
+    "los_sd_m": [0.05, 0.1, 0.2, 0.5],
+    "nlos_sd_m": [0.3, 0.5, 1.0, 3.0, 10.0],
+    "step_share": [0.03, 0.05, 0.07, 0.1],
+    "rest_sd_m": [0.005, 0.01, 0.03],
 }
 SPACE: dict[str, dict[str, list[Any]]] = {
     "los_weighted": _WEIGHTED,
-    "los_weighted_residual": _WEIGHTED | {"residual_gate": [1.0, 1.5, 2.0, 3.0]},
+    "los_weighted_residual": _WEIGHTED | {"residual_gate": [1.5, 2.0, 3.0, 4.0, 6.0]},
     "robust_kf": _EKF | {"trust": [0.5, 0.7, 0.9, 0.95]},
     "ekf": _EKF,
     "adaptive_ekf": _EKF | {"memory": [0.8, 0.9, 0.95, 0.98, 0.99]},

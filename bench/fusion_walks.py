@@ -27,6 +27,7 @@ from mine_loc_sim.magnetic_field import GalleryField
 from mine_loc_sim.mine import LinkGeometry
 from mine_loc_sim.n100_device import N100Device
 from mine_loc_sim.radio_constants import INDUSTRIAL
+from mine_loc_sim.range_law import FastTagLinks
 from mine_loc_sim.ranging_link import Radios, Ranges, TagLinks
 from mine_loc_sim.route import WayPoint, plan_route
 from mine_loc_sim.walker import Walker
@@ -36,7 +37,7 @@ from mine_loc_uwb.link_judgement import LinkJudge, load_classifier
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.power_bias import aps011
 from mine_loc_uwb.range_correction import RangeCorrection
-from mine_loc_uwb.received_power import uncompress_dbm
+from mine_loc_uwb.received_power import los_probability_from_powers, odds_of_power_rule, uncompress_dbm
 
 SCENES = Path(__file__).parent / "fusion_scenes"
 _MODEL = Path(__file__).parent.parent / "src/mine_loc_uwb/mine_loc_uwb/models/los.safetensors"
@@ -161,17 +162,15 @@ def _rounds(
     anchors_m = np.array(of["anchors_m"], float)
     count = len(anchors_m)
     blocked_m = _detours_m(of, tag_m, count, detours)
-    links = TagLinks(INDUSTRIAL, Radios.draw(1, radio), Radios.draw(count, radio), _wearer(of, radio), radio)
+    kind = TagLinks if of["judged_by"] == "classifier" else FastTagLinks
+    links = kind(INDUSTRIAL, Radios.draw(1, radio), Radios.draw(count, radio), _wearer(of, radio), radio)
     found = []
     for first in range(0, len(stamp_ns), _CHUNK):
         part = slice(first, first + _CHUNK)
         which = np.tile(np.arange(count), (len(tag_m[part]), 1))
         ways = _ways(of, tag_m[part], anchors_m, blocked_m[part])
         found.append(links.measure(tag_m[part], facing_rad[part], anchors_m[which], which, ways))
-    frames = concatenate([_frames(each) for each in found])
-    linked = [(number, int(stamp)) for stamp in stamp_ns for number in range(count)]
-    judged = LinkJudge(_classifier()).judge(frames, [link for link, _ in linked], [stamp for _, stamp in linked])
-    los = np.array([each.los_probability for each in judged]).reshape(-1, count)
+    los = _judged(of, found, stamp_ns, count)
     received = np.concatenate([each.received for each in found]).reshape(-1, count)
     raw_m = np.concatenate([each.range_m for each in found]).reshape(-1, count)
     power_dbm = np.concatenate([each.receive_power_dbm for each in found]).reshape(-1, count)
@@ -191,6 +190,20 @@ def _rounds(
         )
         for stamp, got, row, told, power in zip(stamp_ns, received, range_m, los, power_dbm, strict=True)
     ]
+
+
+def _judged(of: Mapping[str, Any], found: Sequence[Ranges], stamp_ns: np.ndarray, count: int) -> Array:
+    """LOS probability (rounds, anchors) of the shipped classifier, or of what the powers are worth at even odds."""
+    if of["judged_by"] == "powers":
+        powers = [
+            zip(each.first_path_power_dbm.tolist(), each.receive_power_dbm.tolist(), strict=True) for each in found
+        ]
+        told = [odds_of_power_rule(los_probability_from_powers(*link)) for each in powers for link in each]
+        return np.array(told).reshape(-1, count)
+    frames = concatenate([_frames(each) for each in found])
+    linked = [(number, int(stamp)) for stamp in stamp_ns for number in range(count)]
+    judged = LinkJudge(_classifier()).judge(frames, [link for link, _ in linked], [stamp for _, stamp in linked])
+    return np.array([each.los_probability for each in judged]).reshape(-1, count)
 
 
 def _wearer(of: Mapping[str, Any], rng: np.random.Generator) -> Wearer:

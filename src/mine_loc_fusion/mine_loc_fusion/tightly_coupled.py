@@ -6,7 +6,6 @@ estimated (`step_kernel`). Where there are no ranges, positions that somebody el
 coarse region is a place like them.
 """
 
-import copy
 import math
 from typing import Any, Self
 
@@ -43,7 +42,8 @@ class TightlyCoupled:
         self._s = settings or TightlyCoupledSettings()
         self._height_m = height_m
         self._gate = chi2_quantile(self._s.gate_probability, 2)
-        self._tracker = RobustTracker(self._s.tracker, OWN_STATES)
+        self._tracker = RobustTracker(self._s.alone, OWN_STATES)
+        self._systematic_m2 = np.zeros((2, 2))
         self._starts = 0
         self._alignment = YawAlignment()
         self._yaw_known = False
@@ -85,11 +85,13 @@ class TightlyCoupled:
         if not tracker.started:
             return None
         d, ahead_s = tracker.dimensions, max(to_s(stamp_ns - self._stamp_ns), 0.0)
-        index = [0, 1, d, d + 1]
-        position, velocity, covariance = tracker.x[:2].copy(), tracker.x[d : d + 2].copy(), tracker.P[index][:, index]
+        index = np.array([0, 1, d, d + 1])
+        position, velocity = tracker.x[:2].copy(), tracker.x[d : d + 2].copy()
+        covariance = tracker.P[index[:, None], index]
         if ahead_s > 0.0:
             position += ahead_s * velocity
-            covariance = _ahead(covariance, ahead_s, self._s.tracker.acceleration_density_m2_s3)
+            covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
+        covariance[:2, :2] += self._systematic_m2
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
         since = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
         height_m = None if d == 2 else float(tracker.x[2])
@@ -105,10 +107,12 @@ class TightlyCoupled:
         vars(self).update(vars(saved._copied()))  # noqa: SLF001 one of this class
 
     def _copied(self) -> Self:
-        other = copy.copy(self)
-        other._tracker = self._tracker.copy()  # noqa: SLF001
+        other = object.__new__(type(self))
+        state = vars(other)
+        state.update(vars(self))
+        state["_tracker"] = self._tracker.copy()
         if not self._yaw_known:
-            other._alignment = self._alignment.copy()  # noqa: SLF001
+            state["_alignment"] = self._alignment.copy()
         return other
 
     @property
@@ -124,13 +128,18 @@ class TightlyCoupled:
         tracker.advance(stamp_ns)
         yaw_m2, scale_m2 = self._s.yaw_walk_sd_rad**2 * gone_s, self._s.scale_walk_sd**2 * gone_s
         step_kernel.drift(tracker.P, tracker.first_link, yaw_m2, scale_m2)
-        tracker.motion_known = self._yaw_known and _since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
+        stepping = self._yaw_known and _since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
+        if stepping != tracker.motion_known:
+            tracker.motion_known = stepping
+            tracker.believe(self._s.stepping if stepping else self._s.alone)
 
     def _use_ranges(self, measurements: Measurements) -> list[Verdict]:
         solution = self._tracker.solve(measurements)
         if self._tracker.starts != self._starts:
             self._after_start(measurements.stamp_ns)
         self._ranges_ns = measurements.stamp_ns
+        if self._tracker.started:
+            self._systematic_m2 = solution.fix.covariance_m2[:2, :2] - self._tracker.P[:2, :2]
         if Reason.ACCEPTED in solution.reasons:
             self._uwb_ns = measurements.stamp_ns
         source, gate = Source.TDOA if measurements.shared_offset else Source.RANGE, solution.gate
@@ -145,7 +154,7 @@ class TightlyCoupled:
             self._uwb_ns, self._refused_since_ns = stamp_ns, None
         elif verdict.reason is Reason.GATE:
             self._refused_since_ns = self._refused_since_ns or stamp_ns
-            if to_s(stamp_ns - self._refused_since_ns) >= self._s.tracker.reopen_after_s:
+            if to_s(stamp_ns - self._refused_since_ns) >= self._s.alone.reopen_after_s:
                 self.begin(stamp_ns, place.position_m, place.covariance_m2, None)
                 self._uwb_ns, self._refused_since_ns = stamp_ns, None
                 return Verdict(Source.UWB_POSE, 0, Reason.ACCEPTED)

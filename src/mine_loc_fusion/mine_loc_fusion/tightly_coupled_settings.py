@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 
-def _tracker() -> RobustTrackerSettings:
+def _stepping() -> RobustTrackerSettings:
     """The radio, where steps tell the motion: what is left over of a range is a bias that changes within metres."""
     return RobustTrackerSettings(
         acceleration_density_m2_s3=0.1,
@@ -28,7 +28,10 @@ def _tracker() -> RobustTrackerSettings:
 class TightlyCoupledSettings:
     """Chosen on the tuning seeds of bench/fusion_scenes; docs/fusion.md says how."""
 
-    tracker: RobustTrackerSettings = field(default_factory=_tracker)
+    stepping: RobustTrackerSettings = field(default_factory=_stepping)
+    """Of ranges while steps tell the motion."""
+    alone: RobustTrackerSettings = field(default_factory=lambda: RobustTrackerSettings(restart_after_s=math.inf))
+    """Of ranges while they are all there is."""
     step_along_sd: float = 0.07
     """Of a step's length, relative to it, beyond what all steps of the person share."""
     step_across_sd_m: float = 0.04
