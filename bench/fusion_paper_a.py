@@ -75,8 +75,9 @@ def rows_of(name: str, walk: Walk, positions: list[PositionFix | None], settings
         return run_gtsam(walk, GtsamSettings(**settings))
     if name == "pdr":
         return run_estimator(lambda w: begun(LosWeighted(), w), walk, [None] * len(walk.rounds))
-    if name == "mine_loc":
-        return run_estimator(lambda w: begun(TightlyCoupled(), w), walk)
+    if name in ("mine_loc", "mine_loc_map"):
+        area = walk.area if name == "mine_loc_map" else None
+        return run_estimator(lambda w: begun(TightlyCoupled(area=area), w), walk)
     make: MakeEstimator = lambda w: begun(rival(name, settings), w)  # noqa: E731
     return run_estimator(make, walk, positions)
 
@@ -113,7 +114,8 @@ def walk_of(scene_name: str, seed: int) -> Walk:
 
 def scene_rows(scene_name: str, settings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """All rows of a scene over its scored seeds."""
-    names = ("uwb", "pdr", *settings, "mine_loc")
+    mapped = ("mine_loc_map",) if "gallery_width_m" in scene(scene_name) else ()
+    names = ("uwb", "pdr", *settings, "mine_loc", *mapped)
     found: dict[str, list[list[float]]] = {name: [] for name in names}
     for seed in seeds(scene(scene_name), "seeds"):
         walk = walk_of(scene_name, seed)

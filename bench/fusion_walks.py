@@ -15,7 +15,9 @@ import numpy as np
 import yaml
 from uwb_tracks import Array
 
+from mine_loc_core.site import Gallery
 from mine_loc_core.stamps import NS_PER_S, to_ns
+from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import StepFix
 from mine_loc_pdr.dead_reckoning import ImuSample, PedestrianDeadReckoning
 from mine_loc_pdr.fdilink import ImuFrame
@@ -67,6 +69,8 @@ class Walk:
     start_m: Array
     start_yaw_rad: float
     """Of the odom frame in the map, as found on the first leg, where the course is known."""
+    area: WalkableArea | None
+    """Of a lap through a gallery."""
 
 
 def scene(name: str) -> dict[str, Any]:
@@ -98,7 +102,14 @@ def make_walk(of: Mapping[str, Any], seed: int) -> Walk:
     tag_m = motion.position_m.copy()
     tag_m[:, 2] = of["tag_height_m"]
     rounds = _rounds(of, stamp_ns, tag_m, motion.heading_rad, radio, detours)
-    return Walk(rounds, steps, tag_m[:, :2], tag_m[0, :2], _known_yaw_rad(of, walker, steps))
+    return Walk(rounds, steps, tag_m[:, :2], tag_m[0, :2], _known_yaw_rad(of, walker, steps), _area(of))
+
+
+def _area(of: Mapping[str, Any]) -> WalkableArea | None:
+    if "gallery_width_m" not in of:
+        return None
+    line = tuple((float(x), float(y), 0.0) for x, y in of["corners_m"])
+    return WalkableArea([Gallery("lap", line, of["gallery_width_m"], 3.0)])
 
 
 def _known_yaw_rad(of: Mapping[str, Any], walker: Walker, steps: Sequence[ReportedStep]) -> float:

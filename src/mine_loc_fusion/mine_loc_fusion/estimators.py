@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
+from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.adaptive_ekf import AdaptiveEkf
 from mine_loc_fusion.ekf import Ekf
 from mine_loc_fusion.estimate import Estimator
@@ -18,6 +19,6 @@ RIVALS: Mapping[str, Callable[[], Estimator]] = {
 }
 
 
-def make_estimator(method: str, height_m: float | None) -> Estimator:
-    """A new estimator of one person; `height_m` as in TightlyCoupled."""
-    return TightlyCoupled(height_m=height_m) if method == "mine_loc" else RIVALS[method]()
+def make_estimator(method: str, height_m: float | None, area: WalkableArea | None) -> Estimator:
+    """A new estimator of one person; `height_m` and `area` as in TightlyCoupled."""
+    return TightlyCoupled(height_m=height_m, area=area) if method == "mine_loc" else RIVALS[method]()

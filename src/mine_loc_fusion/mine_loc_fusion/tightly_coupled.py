@@ -14,8 +14,10 @@ import numpy as np
 from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import to_ns, to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
+from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion import step_kernel
 from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PlaceFix, StepFix, is_position, is_step
+from mine_loc_fusion.gallery_walls import between_walls
 from mine_loc_fusion.step_kernel import OWN_STATES, SCALE, YAW
 from mine_loc_fusion.tightly_coupled_settings import TightlyCoupledSettings
 from mine_loc_fusion.yaw_alignment import YawAlignment
@@ -35,12 +37,19 @@ _SHARED_SD_M = 0.1
 class TightlyCoupled:
     """Estimator of one person (see `estimate.Estimator`).
 
-    `height_m`: where the tag is about, in a place where heights are solved for; None = heights are given.
+    `height_m`: where the tag is about, in a place where heights are solved for; None = heights are given. `area`: whose
+    walls bound what is put out; None = no map.
     """
 
-    def __init__(self, settings: TightlyCoupledSettings | None = None, height_m: float | None = None) -> None:
+    def __init__(
+        self,
+        settings: TightlyCoupledSettings | None = None,
+        height_m: float | None = None,
+        area: WalkableArea | None = None,
+    ) -> None:
         self._s = settings or TightlyCoupledSettings()
         self._height_m = height_m
+        self._area = area
         self._gate = chi2_quantile(self._s.gate_probability, 2)
         self._tracker = RobustTracker(self._s.alone, OWN_STATES)
         self._systematic_m2 = np.zeros((2, 2))
@@ -92,6 +101,8 @@ class TightlyCoupled:
             position += ahead_s * velocity
             covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
         covariance[:2, :2] += self._systematic_m2
+        if self._area is not None:
+            position, velocity, covariance = between_walls(position, velocity, covariance, self._area)
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
         since = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
         height_m = None if d == 2 else float(tracker.x[2])

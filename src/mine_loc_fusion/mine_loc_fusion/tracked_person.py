@@ -11,6 +11,7 @@ import numpy as np
 from mine_loc_core.people import Person
 from mine_loc_core.stamps import to_ns
 from mine_loc_core.verdicts import Reason, Source, Verdict
+from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PlaceFix
 from mine_loc_fusion.estimators import make_estimator
 from mine_loc_fusion.late_inputs import LateInputCorrector
@@ -24,8 +25,14 @@ _INNOVATIONS_KEPT = 200
 class TrackedPerson:
     """State and statistics of one person."""
 
-    def __init__(self, person: Person, parameters: FusionParameters, height_m: float | None = None) -> None:
-        """`height_m`: where tags are about, in a place where heights are solved for; None = heights are given."""
+    def __init__(
+        self,
+        person: Person,
+        parameters: FusionParameters,
+        height_m: float | None = None,
+        area: WalkableArea | None = None,
+    ) -> None:
+        """`height_m` and `area` as in TightlyCoupled."""
         self.person = person
         self.epochs = 0
         self.late_epochs = 0
@@ -36,12 +43,12 @@ class TrackedPerson:
         self._normalised_innovations: deque[float] = deque(maxlen=_INNOVATIONS_KEPT)
         self.disabled: set[Source] = set()
         self._parameters = parameters
-        self._height_m = height_m
+        self._height_m, self._area = height_m, area
         self.reset()
 
     def reset(self) -> None:
         """Forget the estimate; statistics stay. Output stamps may start anew: time itself jumped, or a person asked."""
-        estimator = make_estimator(self._parameters.method, self._height_m)
+        estimator = make_estimator(self._parameters.method, self._height_m, self._area)
         self._corrector = LateInputCorrector(estimator, to_ns(self._parameters.history_s))
         self.published_ns: int | None = None
 

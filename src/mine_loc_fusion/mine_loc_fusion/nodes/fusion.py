@@ -21,6 +21,7 @@ from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import to_ns
 from mine_loc_core.verdicts import Source
+from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import Estimate, is_position
 from mine_loc_fusion.nodes.messages import (
     los_fraction,
@@ -59,6 +60,7 @@ class Fusion(NodeBase):
         chosen = self.parameters.range_correction
         correction = load_range_correction(folder / chosen) if chosen else None
         anchors = anchor_frame(self._site, self._site.map_frame).anchors
+        self._area = WalkableArea.of(self._site)
         self._intake = RangeIntake(anchors, self.parameters.max_range_m, correction)
         self._tracked: dict[str, TrackedPerson] = {}
         self._pose_publishers: dict[str, object] = {}
@@ -103,14 +105,13 @@ class Fusion(NodeBase):
         for name in [name for name in self._tracked if people.by_name(name) is None]:
             self._intake.forget(self._tracked.pop(name).person.tag_id)
             self.release(self._pose_publishers.pop(name))
+        solved_height_m = self._site.tag_height_m if self._site.dimensions == 3 else None
         for person in people:
             if self._served and person.name not in self._served:
                 continue
             tracked = self._tracked.get(person.name)
             if tracked is None:
-                self._tracked[person.name] = TrackedPerson(
-                    person, self.parameters, self._site.tag_height_m if self._site.dimensions == 3 else None
-                )
+                self._tracked[person.name] = TrackedPerson(person, self.parameters, solved_height_m, self._area)
             else:
                 tracked.person = person
             if person.name not in self._pose_publishers:

@@ -1,0 +1,61 @@
+"""Walls: a Gaussian that reaches through them is cut off, what lies well inside stays as it is."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mine_loc_core.site import Chamber, Gallery
+from mine_loc_core.walkable_area import WalkableArea
+from mine_loc_fusion.gallery_walls import between_walls
+
+GALLERY = Gallery("g", ((0, 0, 0), (100, 0, 0)), width_m=4.0, height_m=3.0)
+CROSSING = Gallery("c", ((50, -50, 0), (50, 50, 0)), width_m=4.0, height_m=3.0)
+AREA = WalkableArea([GALLERY])
+
+
+def spread(along_m, across_m, correlated_speed=0.0):
+    covariance = np.diag([along_m**2, across_m**2, 1.0, 1.0])
+    covariance[1, 3] = covariance[3, 1] = correlated_speed
+    return covariance
+
+
+def test_the_moments_are_those_of_samples_that_stay_between_the_walls():
+    rng = np.random.default_rng(1)
+    covariance = spread(2.0, 1.5, correlated_speed=0.8)
+    samples = rng.multivariate_normal([30.0, 1.8, 1.0, 0.0], covariance, 400_000)
+    kept = samples[np.abs(samples[:, 1]) < 2.0]
+    position, velocity, found = between_walls(np.array([30.0, 1.8]), np.array([1.0, 0.0]), covariance, AREA)
+    assert np.array([*position, *velocity]) == pytest.approx(kept.mean(axis=0), abs=0.02)
+    assert found == pytest.approx(np.cov(kept.T), abs=0.03)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(0.01, 0.2))
+def test_well_inside_nothing_changes(off_m, sd_m):
+    covariance = spread(1.0, sd_m)
+    position, _, found = between_walls(np.array([30.0, off_m]), np.zeros(2), covariance, AREA)
+    assert position == pytest.approx([30.0, off_m], abs=1e-3)
+    assert found == pytest.approx(covariance, abs=1e-3)
+
+
+@given(st.floats(-6.0, 6.0), st.floats(0.05, 5.0), st.floats(0.05, 5.0))
+def test_the_covariance_stays_one_and_never_grows(off_m, along_m, across_m):
+    covariance = spread(along_m, across_m)
+    _, _, found = between_walls(np.array([30.0, off_m]), np.zeros(2), covariance, AREA)
+    assert np.linalg.eigvalsh(found)[0] >= -1e-9
+    assert np.linalg.eigvalsh(covariance - found)[0] >= -1e-9
+
+
+@pytest.mark.parametrize(
+    ("at", "area"),
+    [
+        ((50.0, 1.9), WalkableArea([GALLERY, CROSSING])),  # at a crossing
+        ((30.0, 1.9), WalkableArea([GALLERY], [Chamber("r", ((25, 2), (35, 2), (35, 9), (25, 9)), 0.0, 3.0)])),
+        ((30.0, 30.0), AREA),  # where there is no gallery
+    ],
+)
+def test_where_walls_are_not_those_of_one_gallery_nothing_changes(at, area):
+    covariance = spread(1.0, 1.0)
+    position, _, found = between_walls(np.array(at), np.zeros(2), covariance, area)
+    assert position == pytest.approx(at)
+    assert found == pytest.approx(covariance)
