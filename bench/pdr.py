@@ -1,12 +1,13 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap paper_b]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap streams activity paper_b]
 
 Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); paper_b
 is simulated. docs/pdr.md explains the rows.
 """
 
 import argparse
+import itertools
 import json
 import os
 import sys
@@ -21,9 +22,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 import pdr_activity
 import pdr_distance
 import pdr_heading
+import pdr_mounting
 import pdr_paper_b
 import pdr_recordings
 import pdr_steps
+import pdr_streams
 from pdr_tracks import track
 from rich.console import Console
 from rich.table import Column, Table
@@ -37,7 +40,8 @@ def ipol() -> dict[str, Any]:
     tracks = [track(recording) for recording in recordings]
     distance, stretch = pdr_distance.ipol(recordings)
     heading = pdr_heading.ipol(recordings, tracks, stretch)
-    return {"steps": pdr_steps.ipol(recordings, tracks), "heading": heading, "distance": distance}
+    steps, mounting = pdr_steps.ipol(recordings, tracks), pdr_mounting.ipol(recordings)
+    return {"steps": steps, "heading": heading, "distance": distance, "mounting": mounting}
 
 
 def oxford() -> dict[str, Any]:
@@ -52,10 +56,16 @@ def mobgap() -> dict[str, Any]:
     return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
 
 
+def streams() -> dict[str, Any]:
+    """How many people one core carries."""
+    return pdr_streams.streams(list(itertools.islice(pdr_recordings.ipol(), 8)))
+
+
 PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "ipol": ipol,
     "oxford": oxford,
     "mobgap": mobgap,
+    "streams": streams,
     "activity": pdr_activity.activity,
     "paper_b": pdr_paper_b.paper_b,
 }

@@ -25,17 +25,19 @@ class AttitudeFilter:
     the body levelled, its x axis the horizontal part of `forward_imu`. Where that points up or down, because the
     stated mounting is wrong, facing is off by a constant, which the alignment of odom with the map takes up.
 
-    Vectors are in the IMU's axes, forward-left-up by convention.
+    Vectors are in the IMU's axes, forward-left-up by convention. `forward_imu` is the level front of the body in them,
+    `start_imu` the attitude at the start, base_link←imu by what was supposed of the mounting.
     """
 
     def __init__(self, force_m_s2: Vector3, forward_imu: Vector3 = (1.0, 0.0, 0.0)) -> None:
         """Start upright by gravity, from a specific force averaged over a moment; raises ValueError if it is zero."""
         self._q = _levelling(force_m_s2)
-        self._forward_imu = forward_imu
+        self.forward_imu = forward_imu
         east, north = self.facing
         if math.hypot(east, north) > _SMALLEST_FORWARD:
-            self._q = _turned_about_up(self._q, -math.atan2(north, east))
-        self._forward_imu = _row_x(self._q)
+            self._q = turned_about_up(self._q, -math.atan2(north, east))
+        self.forward_imu = _row_x(self._q)
+        self.start_imu = self._q
         self.bias_rad_s: Vector3 = (0.0, 0.0, 0.0)
 
     def update(self, dt_s: float, rate_rad_s: Vector3, force_m_s2: Vector3) -> None:
@@ -54,6 +56,13 @@ class AttitudeFilter:
             (rate_rad_s[2] - bz + gain * (fx * uy - fy * ux)) * dt_s,
         )
 
+    def correct(self, heading_rad: float, bias_rad_s: float) -> None:
+        """Add to the heading, and to the gyro's bias about the vertical."""
+        ux, uy, uz = self.up_imu
+        bx, by, bz = self.bias_rad_s
+        self.bias_rad_s = (bx + bias_rad_s * ux, by + bias_rad_s * uy, bz + bias_rad_s * uz)
+        self._q = turned_about_up(self._q, heading_rad)
+
     @property
     def orientation_imu(self) -> Quaternion:
         """odom←imu, unit, w x y z."""
@@ -68,18 +77,25 @@ class AttitudeFilter:
     @property
     def facing(self) -> tuple[float, float]:
         """Where base_link's x axis points, as east-like and north-like components in odom."""
-        w, x, y, z = self._q
-        fx, fy, fz = self._forward_imu
-        return (
-            (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy + 2.0 * (x * z + w * y) * fz,
-            2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy + 2.0 * (y * z - w * x) * fz,
-        )
+        x, y, _ = rotated(self._q, self.forward_imu)
+        return x, y
 
     @property
     def heading_rad(self) -> float:
         """Yaw of base_link in odom, -π..π, counter-clockwise."""
         x, y = self.facing
         return math.atan2(y, x)
+
+
+def rotated(q: Quaternion, v: Vector3) -> Vector3:
+    """The coordinates in A of a vector in B, where `q` is A←B."""
+    w, x, y, z = q
+    vx, vy, vz = v
+    return (
+        (1.0 - 2.0 * (y * y + z * z)) * vx + 2.0 * (x * y - w * z) * vy + 2.0 * (x * z + w * y) * vz,
+        2.0 * (x * y + w * z) * vx + (1.0 - 2.0 * (x * x + z * z)) * vy + 2.0 * (y * z - w * x) * vz,
+        2.0 * (x * z - w * y) * vx + 2.0 * (y * z + w * x) * vy + (1.0 - 2.0 * (x * x + y * y)) * vz,
+    )
 
 
 def turned(q: Quaternion, vx: float, vy: float, vz: float) -> Quaternion:
@@ -110,7 +126,8 @@ def _levelling(force: Vector3) -> Quaternion:
     return 0.5 * n, y / n, -x / n, 0.0
 
 
-def _turned_about_up(q: Quaternion, angle_rad: float) -> Quaternion:
+def turned_about_up(q: Quaternion, angle_rad: float) -> Quaternion:
+    """`q` turned about odom's z axis, counter-clockwise."""
     c, s = math.cos(0.5 * angle_rad), math.sin(0.5 * angle_rad)
     w, x, y, z = q
     return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w

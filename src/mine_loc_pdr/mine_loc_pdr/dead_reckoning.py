@@ -11,9 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mine_loc_core import quaternion
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns, to_s
-from mine_loc_pdr.attitude import STANDARD_GRAVITY_M_S2, AttitudeFilter, Vector3
+from mine_loc_pdr.attitude import (
+    STANDARD_GRAVITY_M_S2,
+    AttitudeFilter,
+    Quaternion,
+    Vector3,
+    rotated,
+    turned_about_up,
+)
 from mine_loc_pdr.drift import BIAS, HEADING, DriftModel, X, Y
+from mine_loc_pdr.magnetic_heading import MagneticHeading
+from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
 from mine_loc_pdr.rest import RestDetector
 from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, Step, StepDetector, StepThresholds
 from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2
@@ -21,7 +31,7 @@ from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_varia
 INITIAL_SPAN_NS = 500 * NS_PER_MS  # of force averaged for the first horizon
 LONGEST_DT_NS = 200 * NS_PER_MS  # beyond it the motion in between is unknown
 CLOCK_JUMP_NS = NS_PER_S  # a step back by more is a new clock, not a late sample
-FACING_SPAN_NS = LONGEST_INTERVAL_NS + NS_PER_S  # a step is reported within a second
+MOTION_SPAN_NS = LONGEST_INTERVAL_NS + NS_PER_S  # a step is reported within a second
 LARGEST_RATE_RAD_S = 100.0  # beyond the range of any such sensor, as is
 LARGEST_FORCE_M_S2 = 1000.0
 # Below the range of any gyro. No rate so fast repeats to the last bit, unless it is clipped.
@@ -38,6 +48,14 @@ class ImuSample:
     stamp_ns: int
     rate_rad_s: Vector3
     force_m_s2: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSample:
+    """Magnetic field in tesla in the IMU's axes at stamp_ns."""
+
+    stamp_ns: int
+    field_t: Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +109,12 @@ class PedestrianDeadReckoning:
         self._initial: list[ImuSample] = []
         self._last: ImuSample | None = None
         self._drift_ns = 0  # up to which the drift model has been carried
-        self._facing: deque[tuple[int, float, float]] = deque()
+        self._motion: deque[tuple[int, Quaternion, Vector3]] = deque()  # stamp, odom←imu, specific force
+        self._front = FrontFinder()
         self._step_heading_rad = 0.0
         self._interval_before_s: float | None = None
-        self._x_m = self._y_m = 0.0
+        self._x_m = self._y_m = self._way_m = 0.0
+        self.magnetic = MagneticHeading()
         self.step_count = 0
         self.faults: Counter[str] = Counter()
 
@@ -114,6 +134,32 @@ class PedestrianDeadReckoning:
         self._last = sample
         return self._advance(attitude, last, sample, to_s(dt_ns))
 
+    def push_field(self, sample: FieldSample) -> None:
+        """Take a sample of the magnetic field, which corrects the heading where it can be trusted.
+
+        It is judged with the attitude at its stamp; one that comes before the attitude, or more than MOTION_SPAN_NS
+        after it, is left out.
+        """
+        attitude = self._attitude
+        if attitude is None or not all(map(math.isfinite, sample.field_t)):
+            return
+        orientation = next((q for stamp_ns, q, _ in reversed(self._motion) if stamp_ns <= sample.stamp_ns), None)
+        if orientation is None:
+            return
+        field_odom_t = rotated(orientation, sample.field_t)
+        field = self.magnetic.push(sample.stamp_ns, self._way_m, field_odom_t, attitude.heading_rad)
+        if field is None:
+            return
+        self._carry_drift()
+        learnt = self.magnetic.compare(field, self._drift)
+        if learnt is not None:
+            attitude.correct(*learnt)
+
+    def rescale(self, scale: float, variance: float) -> None:
+        """Make the steps from now on with another K."""
+        self._stride = self._stride.scaled(scale, variance)
+        self._drift.rescale(variance)
+
     def pose(self) -> OdometryPose | None:
         """The pose at the last sample, None before the horizon is found."""
         if self._attitude is None or self._last is None:
@@ -127,6 +173,15 @@ class PedestrianDeadReckoning:
     def heading_rad(self) -> float | None:
         """Where the waist faces in odom at the last sample; None before the horizon is found."""
         return None if self._attitude is None else self._attitude.heading_rad
+
+    @property
+    def front(self) -> FrontEstimate | None:
+        """Where the walking says the front of the body is, against `forward_imu`; None before it is found."""
+        return self._front.estimate()
+
+    def mounting(self, yaw_rad: float) -> Quaternion | None:
+        """base_link←imu at the start, by gravity, with the front `yaw_rad` beside the supposed one; None before it."""
+        return None if self._attitude is None else turned_about_up(self._attitude.start_imu, -yaw_rad)
 
     @property
     def bias_sd_rad_s(self) -> float:
@@ -163,7 +218,8 @@ class PedestrianDeadReckoning:
         self._last, self._drift_ns = sample, sample.stamp_ns
         self._detector.reset()
         self._rest.reset()
-        self._facing.clear()
+        self._motion.clear()
+        self.magnetic.interrupted()
         self._interval_before_s = None
 
     def _advance(self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float) -> StepEvent | None:
@@ -175,16 +231,16 @@ class PedestrianDeadReckoning:
         attitude.update(dt_s, (0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)), sample.force_m_s2)
         if resting_rate := self._rest.push(dt_s, sample.rate_rad_s, sample.force_m_s2):
             self._learn_bias(attitude, resting_rate)
-        self._remember_facing(sample.stamp_ns, attitude.facing)
+        self._remember(sample, attitude.orientation_imu)
         (ux, uy, uz), (fx, fy, fz) = attitude.up_imu, sample.force_m_s2
         vertical = ux * fx + uy * fy + uz * fz - STANDARD_GRAVITY_M_S2
         step = self._detector.push(sample.stamp_ns, vertical)
-        return None if step is None else self._walk(step)
+        return None if step is None else self._walk(attitude, step)
 
-    def _remember_facing(self, stamp_ns: int, facing: tuple[float, float]) -> None:
-        self._facing.append((stamp_ns, *facing))
-        while self._facing[0][0] < stamp_ns - FACING_SPAN_NS:
-            self._facing.popleft()
+    def _remember(self, sample: ImuSample, orientation: Quaternion) -> None:
+        self._motion.append((sample.stamp_ns, orientation, sample.force_m_s2))
+        while self._motion[0][0] < sample.stamp_ns - MOTION_SPAN_NS:
+            self._motion.popleft()
 
     def _learn_bias(self, attitude: AttitudeFilter, rate: Vector3) -> None:
         self._carry_drift()
@@ -192,8 +248,8 @@ class PedestrianDeadReckoning:
         x, y, z = (b + gain * (r - b) for b, r in zip(attitude.bias_rad_s, rate, strict=True))
         attitude.bias_rad_s = (x, y, z)
 
-    def _walk(self, step: Step) -> StepEvent:
-        heading_rad = self._direction(step)
+    def _walk(self, attitude: AttitudeFilter, step: Step) -> StepEvent:
+        heading_rad = self._direction(attitude, step)
         self._carry_drift()
         self._drift.turn(math.remainder(heading_rad - self._step_heading_rad, math.tau))
         self._step_heading_rad = heading_rad
@@ -204,6 +260,7 @@ class PedestrianDeadReckoning:
         self._drift.step(dx_m, dy_m, self._stride.scale, along_sd_m, length_m * DIRECTION_SD_RAD)
         self._x_m += dx_m
         self._y_m += dy_m
+        self._way_m += length_m
         self.step_count += 1
         return StepEvent(
             step.stamp_ns,
@@ -218,11 +275,20 @@ class PedestrianDeadReckoning:
             step.confidence,
         )
 
-    def _direction(self, step: Step) -> float:
-        """Mean facing from the heel strike before to this one, over which the swing of the pelvis mostly cancels."""
+    def _direction(self, attitude: AttitudeFilter, step: Step) -> float:
+        """Mean facing from the heel strike before to this one, over which the swing of the pelvis mostly cancels.
+
+        What the waist did meanwhile also tells where the front of the body is.
+        """
         since_ns = step.stamp_ns - to_ns(step.interval_s or 0.5)
-        chosen = [f for f in self._facing if since_ns < f[0] <= step.stamp_ns] or [self._facing[-1]]
-        return math.atan2(sum(f[2] for f in chosen), sum(f[1] for f in chosen))
+        chosen = [m for m in self._motion if since_ns < m[0] <= step.stamp_ns] or [self._motion[-1]]
+        stamps_ns, orientations, forces = zip(*chosen, strict=True)
+        facing = quaternion.rotate(orientations, attitude.forward_imu)[:, :2]
+        if step.interval_s is not None:
+            phase_rad = (np.array(stamps_ns) - since_ns) * (math.tau / (step.stamp_ns - since_ns))
+            self._front.add(forward_push(phase_rad, _levelled(quaternion.rotate(orientations, forces), facing)))
+        east, north = facing.sum(axis=0)
+        return math.atan2(north, east)
 
     def _frequency_hz(self, step: Step) -> float | None:
         """Over two steps, so that a limp does not lengthen one leg."""
@@ -244,6 +310,13 @@ def _fault(sample: ImuSample) -> str | None:
     if max(map(abs, sample.rate_rad_s)) > LARGEST_RATE_RAD_S or max(map(abs, sample.force_m_s2)) > LARGEST_FORCE_M_S2:
         return "out_of_range"
     return None
+
+
+def _levelled(force_m_s2: NDArray[np.float64], facing: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Specific force (n, 3) in odom to acceleration along where the waist faces (n, 2), left of it, and up."""
+    east, north = (facing / np.linalg.norm(facing, axis=1, keepdims=True)).T
+    x, y, z = force_m_s2.T
+    return np.column_stack((east * x + north * y, east * y - north * x, z - STANDARD_GRAVITY_M_S2))
 
 
 def _clipped(before: Vector3, now: Vector3) -> float:

@@ -19,6 +19,9 @@ class N100DriverParameters(NodeParameters):
     angular_velocity_stddev: float = parameter(0.01, "of a sample, each axis", unit="rad/s", low=0.0, high=100.0)
     orientation_stddev: float = parameter(0.05, "of the device's attitude, each axis", unit="rad", low=0.0, high=3.2)
     magnetic_field_stddev: float = parameter(1e-6, "of a sample, each axis", unit="T", low=0.0, high=1.0)
+    magnetic_field_rate: float = parameter(
+        10.0, "of imu/mag, at most that of the samples", unit="Hz", low=0.1, high=1000.0
+    )
     stamp_on_arrival: bool = parameter(False, "stamp with the arrival instead of the device's own time", read_only=True)
     latency_ms: float = parameter(
         0.0, "known delay from sampling to the earliest arrival", unit="ms", low=0.0, high=1000.0, read_only=True
@@ -29,6 +32,11 @@ class N100DriverParameters(NodeParameters):
 class PdrParameters(NodeParameters):
     """Parameters of `pdr`."""
 
+    mounting: str = parameter(
+        "walking",
+        "yaw of base_link to imu_link: as found from walking, or as people.yaml states (mounting_rpy_deg)",
+        choices=("walking", "stated"),
+    )
     odometry_rate: float = parameter(10.0, "of <person>/odometry and /tf", unit="Hz", low=0.1, high=200.0)
     activity_model: str = parameter(
         "", "file written by mine-loc train-activity; empty = the one that is shipped", read_only=True

@@ -3,7 +3,7 @@
 A causal moving median takes out spikes and two moving means the knocks of the heel; a step is an adjacent peak and
 valley, both past their thresholds, with exactly one zero crossing between them. The thresholds follow the person: they
 are shares of the peaks of the walk so far. A valley that reaches its threshold is past it whatever follows, so a step
-is reported at that sample already.
+is reported at that sample already, and a slow one's before it.
 
 The foot that is drawn up at a halt or in a turn on the spot makes a peak far below the others; one such weak peak is
 let through after a full step, when it comes in time.
@@ -25,6 +25,11 @@ STRIKE_AFTER_RISE_NS = 65 * NS_PER_MS
 # Half waves of the slowest walk; what takes longer is no step, and would be reported late.
 _LONGEST_PEAK_NS = 550 * NS_PER_MS
 _LONGEST_WAIT_NS = 200 * NS_PER_MS  # from the zero crossing to the valley's threshold
+# A slow peak that has lasted so long and is past is a step before its valley, which comes more than 0.4 s after the
+# strike.
+_OVERDUE_NS = 260 * NS_PER_MS
+_OVERDUE_PEAK_SHARE = 0.5  # of the usual peak, at least
+_OVERDUE_FALL_SHARE = 0.6  # of its own peak, at most
 _BASELINE_TIME_CONSTANT_S = 2.0
 _ADAPTATION = 0.3  # share of the newest step in what is held for usual
 _FIRST_INTERVAL_S = 0.55  # until a walk has shown its own
@@ -121,7 +126,7 @@ class StepDetector:
         self._positive = False
         self._peak_m_s2 = self._valley_m_s2 = 0.0
         self._rise_ns = self._fall_ns = 0
-        self._awaiting_valley = False
+        self._awaiting_valley = self._foreseen = False
         self._last_step_ns: int | None = None
         self._was_weak = False
         self._usual_peak_m_s2 = 0.0
@@ -135,14 +140,28 @@ class StepDetector:
         if value > 0.0:
             if not self._positive:
                 self._positive, self._peak_m_s2, self._rise_ns = True, 0.0, middle_ns
+                self._foreseen = False
             self._peak_m_s2 = max(self._peak_m_s2, value)
-            return None
+            return self._overdue(middle_ns, value)
         if self._positive:
             self._positive, self._fall_ns = False, middle_ns
-            self._awaiting_valley = middle_ns - self._rise_ns <= _LONGEST_PEAK_NS
+            self._awaiting_valley = not self._foreseen and middle_ns - self._rise_ns <= _LONGEST_PEAK_NS
         step = self._at_valley(middle_ns, value) if self._awaiting_valley else None
         self._valley_m_s2 = min(self._valley_m_s2, value)
         return step
+
+    def _overdue(self, middle_ns: int, value: float) -> Step | None:
+        """The step of a slow peak that is past, in a walk: its valley would come too late to be waited for."""
+        last_ns, peak_m_s2 = self._last_step_ns, self._peak_m_s2
+        lasts = middle_ns - self._rise_ns >= _OVERDUE_NS and value <= _OVERDUE_FALL_SHARE * peak_m_s2
+        if self._foreseen or not lasts or last_ns is None:
+            return None
+        walking = self._rise_ns + STRIKE_AFTER_RISE_NS - last_ns <= LONGEST_INTERVAL_NS
+        least_m_s2 = max(_OVERDUE_PEAK_SHARE * self._usual_peak_m_s2, self._thresholds.start_peak_m_s2)
+        if not walking or peak_m_s2 < least_m_s2:
+            return None
+        self._foreseen = True
+        return self._complete(strong=True)
 
     def _without_offset(self, stamp_ns: int, value: float) -> float:
         if self._last_sample_ns is not None:
@@ -158,6 +177,10 @@ class StepDetector:
             self._awaiting_valley = middle_ns - self._fall_ns <= _LONGEST_WAIT_NS
             return None
         self._awaiting_valley = False
+        return self._complete(strong=strong)
+
+    def _complete(self, *, strong: bool) -> Step | None:
+        least = self._thresholds
         stamp_ns, last_ns = self._rise_ns + STRIKE_AFTER_RISE_NS, self._last_step_ns
         if last_ns is None or stamp_ns - last_ns > LONGEST_INTERVAL_NS:
             return self._first(stamp_ns) if self._peak_m_s2 >= least.start_peak_m_s2 else None

@@ -4,7 +4,7 @@ Both have the scale K of the person, found from walks of known length (`stride_c
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from mine_loc_core.people import Person
@@ -38,6 +38,9 @@ class StepLengthModel(Protocol):
         `swing_m_s2` is the vertical acceleration of the waist from valley to peak.
         """
 
+    def scaled(self, scale: float, variance: float) -> "StepLengthModel":
+        """The same with another K."""
+
 
 @dataclass(frozen=True, slots=True)
 class StrideModel:
@@ -55,6 +58,10 @@ class StrideModel:
         by_height_m = self.alpha * (self.height_m - TYPICAL_HEIGHT_M)
         by_frequency_m = self.beta * faster_hz * self.height_m / TYPICAL_HEIGHT_M
         return (0.7 + by_height_m + by_frequency_m) * self.scale
+
+    def scaled(self, scale: float, variance: float) -> "StrideModel":
+        """The same with another K."""
+        return replace(self, scale=scale, scale_variance=variance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +82,10 @@ class PendulumStrideModel:
         rise = math.sqrt(self.height_m * swing_m_s2)
         length_m = PENDULUM_FACTOR * rise / (frequency_hz or TYPICAL_FREQUENCY_HZ)
         return min(length_m, LONGEST_STEP_SHARE * self.height_m) * self.scale
+
+    def scaled(self, scale: float, variance: float) -> "PendulumStrideModel":
+        """The same with another K."""
+        return replace(self, scale=scale, scale_variance=variance)
 
 
 def common_variance_m2(model: StepLengthModel, length_m: float) -> float:

@@ -227,6 +227,29 @@ def test_broken_input_moves_nobody_further_than_a_step_at_a_time(kind, fault):
         assert pdr.faults[fault] > 0
 
 
+def test_a_burst_after_half_a_second_of_silence_is_bridged_by_device_time():
+    """The Wi-Fi bridge holds samples back and sends them at once: stamps tell when they were, arrival plays no part."""
+    samples = walk([(20.0, 0.0)])
+    clean, _ = push_all(samples)
+    bridged = PedestrianDeadReckoning(StrideModel(1.75))
+    for begin in range(0, len(samples), 50):
+        for sample in samples[begin : begin + 50]:
+            bridged.push(sample)
+        assert not bridged.faults
+    assert bridged.pose().x_m == clean.pose().x_m
+
+
+@pytest.mark.parametrize(("lost", "declared"), [(10, {}), (15, {}), (25, {"gaps": 1}), (50, {"gaps": 1})])
+def test_a_few_lost_samples_are_bridged_and_half_a_second_is_declared(lost, declared):
+    samples = walk([(20.0, 0.0)])
+    clean, _ = push_all(samples)
+    pdr, _ = push_all(samples[:1200] + samples[1200 + lost :])
+    assert pdr.faults == declared
+    assert abs(pdr.pose().x_m - clean.pose().x_m) < 2.0
+    if declared:
+        assert pdr.pose().covariance[2, 2] > clean.pose().covariance[2, 2] + (0.01 * lost) ** 2
+
+
 def test_at_half_the_rate_the_walk_is_as_long():
     samples = walk([(20.0, 0.0)])
     full, _ = push_all(samples, PedestrianDeadReckoning(PendulumStrideModel(1.75)))

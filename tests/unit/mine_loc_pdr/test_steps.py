@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import butter, sosfiltfilt
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMean, MovingMedian, Step, StepDetector
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMean, MovingMedian, Step, StepDetector, StepThresholds
 
 
 def detect(values, rate_hz=100, detector=None, start_ns=10**18):
@@ -41,6 +42,14 @@ def test_a_step_is_stamped_at_its_strike_after_the_rise_and_reported_within_four
         assert reported_ns - step.stamp_ns < 400 * NS_PER_MS
 
 
+def test_a_slow_step_is_reported_before_its_valley_and_once():
+    steps = detect(np.concatenate((walk(5, 1.6), walk(20, 1.0))))
+    assert len(steps) == 28
+    slow = [reported_ns - step.stamp_ns for reported_ns, step in steps if step.interval_s and step.interval_s > 0.9]
+    assert len(slow) >= 18
+    assert max(slow) < 500 * NS_PER_MS  # the valley of such a step begins after 590 ms
+
+
 def test_standing_still_is_no_step():
     noise = np.random.default_rng(0).normal(0.0, 0.05, 60_000)
     assert detect(noise) == []
@@ -49,6 +58,36 @@ def test_standing_still_is_no_step():
 def test_swaying_and_shifting_the_weight_is_no_step():
     assert detect(walk(60, 0.5, amplitude=0.35)) == []
     assert detect(walk(60, 1.5, amplitude=0.8)) == []
+
+
+def vibration(low_hz, high_hz, rms_m_s2, seconds=60):
+    noise = np.random.default_rng(0).standard_normal(100 * seconds)
+    band = sosfiltfilt(butter(2, [low_hz, high_hz], "bandpass", fs=100, output="sos"), noise)
+    return band * rms_m_s2 / band.std()
+
+
+@pytest.mark.parametrize(("low_hz", "high_hz", "rms_m_s2"), [(1, 4, 0.3), (2, 8, 0.3), (4, 20, 1.0)])
+def test_a_ride_is_no_walk(low_hz, high_hz, rms_m_s2):
+    """The vibration of a car's seat; a rough ride, 0.6 m/s² between 1 and 8 Hz, is taken for walking (docs/pdr.md)."""
+    assert detect(vibration(low_hz, high_hz, rms_m_s2)) == []
+
+
+@pytest.mark.parametrize("blows_hz", [0.8, 1.2, 2.0])
+def test_hammering_is_no_walk(blows_hz):
+    """Blows as the waist feels them: knocks of 6 m/s² for 30 ms, and the arm's swing."""
+    t = np.arange(6000) / 100
+    knocks = 6.0 * np.exp(-0.5 * ((((t * blows_hz) % 1.0 - 0.5) / blows_hz) / 0.012) ** 2)
+    swing = 0.3 * np.sin(math.tau * blows_hz * t)
+    assert detect(knocks - knocks.mean() + swing) == []
+
+
+@pytest.mark.parametrize("seconds", [1.2, 1.6, 2.0])
+@pytest.mark.parametrize("depth_m", [0.45, -0.45])
+def test_sitting_down_and_standing_up_is_no_step(seconds, depth_m):
+    s = np.arange(round(100 * seconds)) * 0.01 / seconds
+    acceleration = -depth_m / seconds**2 * (60.0 * s - 180.0 * s**2 + 120.0 * s**3)  # of a smooth way down
+    still = np.zeros(300)
+    assert detect(np.concatenate((still, acceleration, still))) == []
 
 
 def test_in_a_walk_weaker_peaks_count_than_at_its_start():
@@ -60,8 +99,9 @@ def test_two_zero_crossings_between_peak_and_valley_are_no_step():
     valley = np.full(20, -2.0)
     up = np.concatenate((valley, -valley))
     wiggle = np.concatenate((np.full(30, -0.02), np.full(30, 0.02)))
-    assert len(detect(np.concatenate((up, valley)))) == 1
-    assert detect(np.concatenate((up, wiggle, valley))) == []
+    deep = StepThresholds(valley_m_s2=0.05)  # the valley that the wiggle does not reach
+    assert len(detect(np.concatenate((up, valley)), detector=StepDetector(deep))) == 1
+    assert detect(np.concatenate((up, wiggle, valley)), detector=StepDetector(deep)) == []
 
 
 def test_the_first_step_after_standing_has_no_interval():

@@ -95,11 +95,12 @@ class NodeBase(LifecycleNode):
             publisher.on_activate(None)
         return self._keep(publisher, self.destroy_lifecycle_publisher)
 
-    def subscribe(self, kind: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile) -> Any:
-        """A subscription that is heard while the node is active."""
-        return self._keep(
-            self.create_subscription(kind, topic, self.guarded(callback, topic), qos), self.destroy_subscription
-        )
+    def subscribe(
+        self, kind: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile, *, raw: bool = False
+    ) -> Any:
+        """A subscription that is heard while the node is active; `raw` hands over serialised bytes, no message."""
+        subscription = self.create_subscription(kind, topic, self.guarded(callback, topic), qos, raw=raw)
+        return self._keep(subscription, self.destroy_subscription)
 
     def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """A timer of steady time that runs while the node is active."""

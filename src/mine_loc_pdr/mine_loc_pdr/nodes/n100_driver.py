@@ -12,7 +12,7 @@ from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.serial_link import SerialLink
-from mine_loc_core.stamps import NS_PER_MS
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
 from mine_loc_pdr.nodes.messages import Covariances, to_header, to_imu, to_magnetic_field
 from mine_loc_pdr.parameters import N100DriverParameters
@@ -46,7 +46,7 @@ class N100Driver(NodeBase):
     def activate(self) -> None:
         """Open the line, and keep opening it."""
         self._stream = N100Stream(self._new_clock())
-        self._published = self._reported = self._lost = 0
+        self._published = self._reported = self._lost = self._field_published = 0
         self._reported_at_s = time.monotonic()
         self._link = SerialLink(self.parameters.port, self.parameters.baud, clock=self.now_ns, wake=_no_wake)
         self._link.start()
@@ -56,8 +56,9 @@ class N100Driver(NodeBase):
         self._link.stop()
 
     def parameters_changed(self) -> None:
-        """Work out the covariances."""
+        """Work out the covariances, and the period of the magnetic field."""
         self._covariances = Covariances.of(self.parameters)
+        self._field_period_ns = round(NS_PER_S / self.parameters.magnetic_field_rate)
 
     def clock_jumped(self, delta_ns: int) -> None:
         """Map device time anew."""
@@ -84,7 +85,9 @@ class N100Driver(NodeBase):
     def _publish(self, measurement: ImuMeasurement) -> None:
         header = to_header(measurement, self.parameters.person)
         self._imu.publish(to_imu(measurement, header, self._covariances))
-        if self._mag.get_subscription_count():  # publishing costs as much as all the rest, heard or not
+        period = measurement.stamp_ns // self._field_period_ns
+        if period != self._field_published and self._mag.get_subscription_count():
+            self._field_published = period
             self._mag.publish(to_magnetic_field(measurement, header, self._covariances))
         if measurement.pressure_pa is not None:
             self._pressure.publish(FluidPressure(header=header, fluid_pressure=measurement.pressure_pa))

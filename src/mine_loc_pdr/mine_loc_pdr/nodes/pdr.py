@@ -9,10 +9,10 @@ from typing import Any
 
 from geometry_msgs.msg import TransformStamped
 from mine_loc_interfaces.msg import Activity as ActivityMessage
-from mine_loc_interfaces.msg import LandmarkFix, Step
+from mine_loc_interfaces.msg import LandmarkFix, Step, StrideUpdate, UwbPose
 from mine_loc_interfaces.srv import Reset, SetPose
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, MagneticField
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -20,7 +20,7 @@ from mine_loc_core import quaternion
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
-from mine_loc_core.nodes.qos import EVENTS, STREAM
+from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.site import Site, load_site
 from mine_loc_core.stamps import NS_PER_S
@@ -33,9 +33,14 @@ from mine_loc_pdr.nodes.landmark_messages import to_landmark_fix, to_map_pose
 from mine_loc_pdr.parameters import PdrParameters
 from mine_loc_pdr.plane_follower import PlaneFollower
 from mine_loc_pdr.pseudo_plane import PseudoPlane
+from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
 from mine_loc_pdr.stride import stride_model
+from mine_loc_pdr.stride_refinement import Fix, StrideRefiner, StrideScale
 
 _PEOPLE_PERIOD_S = 1.0
+_MOUNTING_PERIOD_S = 1.0
+_MOUNTING_MOVED_RAD = math.radians(5.0)  # a transform said to be static is not sent anew for less
+_WRONG_FRONT_RAD = math.radians(30.0)
 _SILENT_S = 1.0
 _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says nothing about them
 
@@ -46,11 +51,12 @@ class Track:
     def __init__(self, person: Person, n100: N100, activities: ActivityModel, site: Site) -> None:
         self.person = person
         self._n100 = n100
+        self.entities: list[Any] = []  # what is released with the track
         self._activities = activities
         self._site = site
-        self.subscription: Any = None
         self.odometry: Any = None
         self.heard_s = time.monotonic()
+        self.field_heard_s = -math.inf
         self.faults_reported = 0
         self.restart()
 
@@ -58,13 +64,16 @@ class Track:
         """Begin at the origin of odom."""
         mounting = quaternion.from_euler_zyx(*self._n100.mounting_rpy_rad)
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
-        self.pdr = PedestrianDeadReckoning(stride_model(self.person), (float(x), float(y), float(z)))
+        stride = stride_model(self.person)
+        self.pdr = PedestrianDeadReckoning(stride, (float(x), float(y), float(z)))
+        self.refiner = StrideRefiner(stride.scale, stride.scale_variance)
         self._recogniser = ActivityRecogniser(self._activities)
         area = WalkableArea.of(self._site)
         self.plane = PlaneFollower(
             PseudoPlane(self._site.turn_markers), None if area is None else GalleryConstraint(area)
         )
         self.published_period = 0
+        self.mounting_yaw_rad: float | None = None  # as last published
         self.samples = 0
 
     def recognise(self, sample: ImuSample) -> Activity | None:
@@ -74,7 +83,7 @@ class Track:
 
 
 class Pdr(NodeBase):
-    """Publishes pdr/steps, pdr/activity, pdr/landmark_fix, and each person's <person>/odometry and transform."""
+    """Publishes pdr/steps, activity, landmark_fix and stride_updates, each <person>/odometry and its transforms."""
 
     parameter_class = PdrParameters
 
@@ -90,11 +99,15 @@ class Pdr(NodeBase):
         self._activity_model, _ = load_model(Path(model) if model else shipped_model())
         self._activities = self.publish_to(ActivityMessage, "pdr/activity", EVENTS)
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
+        self._strides = self.publish_to(StrideUpdate, "pdr/stride_updates", EVENTS)
+        self.subscribe(UwbPose, "uwb/pose", self._on_uwb_pose, EVENTS)
         self._landmark_fixes = self.publish_to(LandmarkFix, "pdr/landmark_fix", EVENTS)
         self._tf = self.publish_to(TFMessage, "/tf", EVENTS)
+        self._tf_static = self.publish_to(TFMessage, "/tf_static", LATCHED)
         self._follow(self._file.people)
         self.parameters_changed()
         self.every(_PEOPLE_PERIOD_S, self._poll_people)
+        self.every(_MOUNTING_PERIOD_S, self._publish_mountings)
         self.serve(Reset, "~/reset", self._reset)
         self.serve(SetPose, "~/set_pose", self._set_pose)
 
@@ -118,7 +131,7 @@ class Pdr(NodeBase):
         wearers = {person.name: person for person in people if person.n100}
         for name, track in list(self._tracks.items()):
             if wearers.get(name) != track.person:
-                self.release(track.subscription, track.odometry)
+                self.release(*track.entities)
                 del self._tracks[name]
         for name, person in wearers.items():
             if name not in self._tracks and person.n100:
@@ -127,27 +140,48 @@ class Pdr(NodeBase):
     def _new_track(self, person: Person, n100: N100) -> Track:
         track = Track(person, n100, self._activity_model, self._site)
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
-        track.subscription = self.subscribe(
-            Imu, f"/{person.name}/imu/data", lambda message: self._on_imu(track, message), STREAM
+        name = f"/{person.name}/imu"
+        imu = self.subscribe(Imu, f"{name}/data", lambda message: self._on_imu(track, message), STREAM, raw=True)
+        mag = self.subscribe(
+            MagneticField, f"{name}/mag", lambda message: self._on_field(track, message), STREAM, raw=True
         )
+        track.entities = [track.odometry, imu, mag]
         return track
 
-    def _on_imu(self, track: Track, message: Imu) -> None:
-        rate, force = message.angular_velocity, message.linear_acceleration
-        stamp_ns = to_stamp_ns(message.header.stamp)
-        sample = ImuSample(stamp_ns, (rate.x, rate.y, rate.z), (force.x, force.y, force.z))
+    def _on_imu(self, track: Track, message: bytes) -> None:
+        sample = imu_sample(message)
         step = track.pdr.push(sample)
         track.samples += 1
         track.heard_s = time.monotonic()
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
+            self._refine_stride(track, step)
         if (activity := track.recognise(sample)) is not None:
             self._activities.publish(_activity(track.person.name, activity))
-        self._follow_plane(track, stamp_ns, step)
-        period = stamp_ns // self._period_ns
+        self._follow_plane(track, sample.stamp_ns, step)
+        period = sample.stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
             self._publish_pose(track, pose)
+
+    def _refine_stride(self, track: Track, step: StepEvent) -> None:
+        first = step.interval_s is None
+        found = track.refiner.step(step.stamp_ns, complex(step.x_m, step.y_m), first=first)
+        if found is not None:
+            track.pdr.rescale(found.scale, found.variance)
+            self._strides.publish(_stride_update(track.person, step.stamp_ns, found))
+
+    def _on_uwb_pose(self, message: UwbPose) -> None:
+        track = next((t for t in self._tracks.values() if t.person.tag_id == message.tag_id), None)
+        if track is None or message.status != UwbPose.OK or "/" in message.header.frame_id:  # of a vehicle's own frame
+            return
+        place, covariance = message.pose.pose.position, message.pose.covariance
+        variance_m2 = float(max(covariance[0], covariance[7]))
+        track.refiner.fix(Fix(to_stamp_ns(message.header.stamp), complex(place.x, place.y), variance_m2))
+
+    def _on_field(self, track: Track, message: bytes) -> None:
+        track.pdr.push_field(field_sample(message))
+        track.field_heard_s = time.monotonic()
 
     def _follow_plane(self, track: Track, stamp_ns: int, step: StepEvent | None) -> None:
         if (heading_rad := track.pdr.heading_rad) is None:
@@ -170,6 +204,31 @@ class Pdr(NodeBase):
         transform.transform.rotation = body.orientation
         self._tf.publish(TFMessage(transforms=[transform]))
 
+    def _publish_mountings(self) -> None:
+        """Where the sensors sit, all in one message, since the last one is all that a latecomer gets."""
+        found = {name: yaw for name, track in self._tracks.items() if (yaw := self._mounting_yaw(track)) is not None}
+        moved = [name for name, yaw in found.items() if _differs(yaw, self._tracks[name].mounting_yaw_rad)]
+        if not moved:
+            return
+        for name in moved:
+            self._tracks[name].mounting_yaw_rad = found[name]
+        tracks = [track for track in self._tracks.values() if track.mounting_yaw_rad is not None]
+        self._tf_static.publish(TFMessage(transforms=[self._mounting(track) for track in tracks]))
+
+    def _mounting_yaw(self, track: Track) -> float | None:
+        """Yaw of the front beside the supposed one; None while it is not known."""
+        if self.parameters.mounting == "stated":
+            return None if track.pdr.pose() is None else 0.0
+        return front.yaw_rad if (front := track.pdr.front) else None
+
+    def _mounting(self, track: Track) -> TransformStamped:
+        name = track.person.name
+        transform = TransformStamped(child_frame_id=f"{name}/imu_link")
+        transform.header = Header(stamp=to_time(self.now_ns()), frame_id=f"{name}/base_link")
+        q = transform.transform.rotation
+        q.w, q.x, q.y, q.z = track.pdr.mounting(track.mounting_yaw_rad)
+        return transform
+
     def _reset(self, request: Any) -> tuple[bool, str]:
         if request.person and request.person not in self._tracks:
             return False, f"{request.person}: wears no N100; known: {', '.join(self._tracks) or 'nobody'}"
@@ -183,8 +242,7 @@ class Pdr(NodeBase):
         if track is None:
             return False, f"{request.person!r}: wears no N100; known: {', '.join(self._tracks) or 'nobody'}"
         pose = to_map_pose(request.pose, self._site.map_frame)
-        scale_variance = stride_model(track.person).scale_variance
-        refusal = track.plane.set_pose(pose, scale_variance, track.pdr.bias_sd_rad_s)
+        refusal = track.plane.set_pose(pose, track.refiner.known.variance, track.pdr.bias_sd_rad_s)
         if refusal is not None:
             return False, f"{request.person}: {refusal}"
         return True, f"{request.person} is followed from there"
@@ -194,15 +252,26 @@ class Pdr(NodeBase):
         faults = sum(pdr.faults.values())
         new_faults, track.faults_reported = faults - track.faults_reported, faults
         values = {"samples": track.samples, "steps": pdr.step_count, **pdr.faults}
+        values["magnetometer"] = "heard" if time.monotonic() - track.field_heard_s < _SILENT_S else "absent"
+        values["stride_k"] = f"{track.refiner.known.scale:.3f} ± {math.sqrt(track.refiner.known.variance):.3f}"
+        values |= {f"stretches_{verdict}": count for verdict, count in track.refiner.verdicts.items()}
+        values |= {f"field_{verdict}": count for verdict, count in pdr.magnetic.verdicts.items()}
         pose = pdr.pose()
         if pose is not None:
             values["heading_sd_deg"] = f"{math.degrees(math.sqrt(pose.covariance[2, 2])):.1f}"
             values["gyro_bias_sd_deg_s"] = f"{math.degrees(pdr.bias_sd_rad_s):.3f}"
+        front = pdr.front
+        if front is not None:
+            values["front_yaw_deg"] = f"{math.degrees(front.yaw_rad):.0f}"
+            values["front_yaw_sd_deg"] = f"{math.degrees(math.sqrt(front.variance_rad2)):.0f}"
         values |= {f"landmark_{name}": count for name, count in track.plane.counts.items()}
         if silent_s > _SILENT_S:
             return Health(name, Level.ERROR, f"no samples for {silent_s:.1f} s", values)
         if new_faults:
             return Health(name, Level.WARN, f"{new_faults} unusable samples or gaps in the last second", values)
+        if self.parameters.mounting == "stated" and front is not None and abs(front.yaw_rad) > _WRONG_FRONT_RAD:
+            beside = f"walks {math.degrees(front.yaw_rad):.0f}° beside the front that mounting_rpy_deg states"
+            return Health(name, Level.WARN, beside, values)
         return Health(name, Level.OK, "tracking" if pose is not None else "finding the horizon", values)
 
 
@@ -219,6 +288,22 @@ def _step(person: str, step: StepEvent) -> Step:
         position=to_point((step.x_m, step.y_m, 0.0)),
         confidence=step.confidence,
     )
+
+
+def _stride_update(person: Person, stamp_ns: int, found: StrideScale) -> StrideUpdate:
+    return StrideUpdate(
+        header=Header(stamp=to_time(stamp_ns), frame_id=f"{person.name}/odom"),
+        person=person.name,
+        k=found.scale,
+        k_variance=found.variance,
+        alpha=person.stride.alpha,
+        beta=person.stride.beta,
+        steps_used=found.steps_used,
+    )
+
+
+def _differs(yaw_rad: float, published_rad: float | None) -> bool:
+    return published_rad is None or abs(math.remainder(yaw_rad - published_rad, math.tau)) > _MOUNTING_MOVED_RAD
 
 
 def _activity(person: str, activity: Activity) -> ActivityMessage:
