@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _RANGE_MARGIN_SD = 3.0
-LARGEST_MARGIN = 0.2
-"""A crossing farther than the detection range counts as far as its own error explains it, but no more than this."""
+LEAST_MARGIN, LARGEST_MARGIN = 0.02, 0.2
+"""A crossing beyond the detection range counts as far as its own error explains it, within these shares of the range:
+the range ends nowhere sharply, and what is farther than the largest is no place to look for anybody."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +69,9 @@ def cross(
     r_j = (baseline_m[:, 0] * u_i[:, 1] - baseline_m[:, 1] * u_i[:, 0]) * inverse
     a = np.abs(r_j * inverse) * np.sqrt(variance_rad2[second])  # along line i, by the error of line j
     b = np.abs(r_i * inverse) * np.sqrt(variance_rad2[first])
-    margin = LARGEST_MARGIN * range_m
-    far_i = r_i > range_m + np.minimum(_RANGE_MARGIN_SD * a, margin)
-    far_j = r_j > range_m + np.minimum(_RANGE_MARGIN_SD * b, margin)
+    least, largest = LEAST_MARGIN * range_m, LARGEST_MARGIN * range_m
+    far_i = r_i > range_m + np.minimum(least + _RANGE_MARGIN_SD * a, largest)
+    far_j = r_j > range_m + np.minimum(least + _RANGE_MARGIN_SD * b, largest)
     refused: Counter[str] = Counter()
     good = np.ones(len(first), bool)
     for reason, failed in (

@@ -77,6 +77,9 @@ class OpenReports:
         self.refused: Counter[str] = Counter()
         self.forget()
 
+    def __len__(self) -> int:
+        return len(self._open)
+
     def forget(self) -> None:
         """Drop all, as after a jump of the clock."""
         whole, real = np.zeros(0, np.int64), np.zeros(0)
