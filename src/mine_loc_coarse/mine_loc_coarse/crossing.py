@@ -30,8 +30,8 @@ class Crossings:
     def __len__(self) -> int:
         return len(self.first)
 
-    def taken(self, which: NDArray[np.bool_]) -> "Crossings":
-        """The crossings that `which` (n,) picks."""
+    def taken(self, which: NDArray[np.bool_] | Indices) -> "Crossings":
+        """The crossings that `which` picks."""
         return Crossings(
             self.first[which], self.second[which], self.position_m[which], self.covariance_m2[which], self.refused
         )

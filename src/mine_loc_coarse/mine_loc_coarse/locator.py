@@ -85,14 +85,15 @@ class Locator:
             s.detection_range_m,
         )
         self.crossings, self.refused = len(crossings), crossings.refused
-        on = lines.emission[crossings.first]
+        part = _parts(crossings, len(lines))
+        crossings = crossings.taken(np.argsort(part[crossings.first], kind="stable"))
+        on = part[crossings.first]
         cluster = clusters(crossings.position_m, crossings.covariance_m2, on)
         gathered = _Gathering(lines)
-        clear = self._clear(lines, crossings, cluster, on)
-        self._take_clear(gathered, lines, crossings, on, clear)
-        for each in np.flatnonzero(np.bincount(on, minlength=len(clear)).astype(bool) & ~clear).tolist():
-            here = [known for known in expected if known.emission == each]
-            self._weigh(gathered, lines, crossings.taken(on == each), here)
+        clear = self._clear(lines, crossings, cluster, part)
+        self._take_clear(gathered, lines, crossings, part, clear)
+        for each in np.setdiff1d(on, np.flatnonzero(clear)).tolist():
+            self._weigh(gathered, lines, crossings.taken(on == each), expected)
         return gathered.emitters(line_of_report)
 
     def _uncrowded(self, lines: BearingLines) -> Indices:
@@ -104,57 +105,59 @@ class Locator:
             return lines.emission
         return np.cumsum(crowd | (np.diff(lines.emission, prepend=-1) != 0))
 
-    def _clear(self, lines: BearingLines, crossings: Crossings, cluster: Indices, on: Indices) -> Flags:
-        """Emissions (e,) of which one emitter explains everything: one cluster that has all lines, one a monitor."""
-        count = int(lines.emission[-1]) + 1 if len(lines) else 0
-        total = np.bincount(lines.emission, minlength=count)
-        new = np.diff(lines.emission * len(self._place_m) + lines.monitor, prepend=-1) != 0
-        distinct = np.bincount(lines.emission[new], minlength=count)
-        crossed = np.zeros(len(lines), bool)
-        crossed[crossings.first] = crossed[crossings.second] = True
-        met = np.bincount(lines.emission[crossed], minlength=count)
+    def _clear(self, lines: BearingLines, crossings: Crossings, cluster: Indices, part: Indices) -> Flags:
+        """Parts (p,) that one emitter explains: one cluster of crossings, and one line a monitor."""
+        count = int(part.max()) + 1 if len(part) else 0
+        total = np.bincount(part, minlength=count)
+        pairs = np.unique(part * len(self._place_m) + lines.monitor)
+        distinct = np.bincount(pairs // len(self._place_m), minlength=count)
         _, one_of_each = np.unique(cluster, return_index=True)
-        many = np.bincount(on[one_of_each], minlength=count)
-        clear: Flags = (many == 1) & (total == distinct) & (met == total)
+        many = np.bincount(part[crossings.first[one_of_each]], minlength=count)
+        clear: Flags = (many == 1) & (total == distinct)
         return clear
 
     def _take_clear(
-        self, gathered: "_Gathering", lines: BearingLines, crossings: Crossings, on: Indices, clear: Flags
+        self, gathered: "_Gathering", lines: BearingLines, crossings: Crossings, part: Indices, clear: Flags
     ) -> None:
-        """State the clear emissions, if it is no wonder that the other monitors are silent; else clear no more."""
+        """State the clear parts, if it is no wonder that the other monitors are silent; else they are clear no more."""
         numbers = np.flatnonzero(clear)
         if not len(numbers):
             return
+        on = part[crossings.first]
         weight = 1.0 / np.trace(crossings.covariance_m2, axis1=1, axis2=2)
         total = np.bincount(on, weight, len(clear))[numbers]
         x, y = (np.bincount(on, weight * crossings.position_m[:, axis], len(clear))[numbers] / total for axis in (0, 1))
         position_m = np.stack([x, y], axis=1)
         scans = np.zeros(len(clear))
-        np.maximum.at(scans, lines.emission, lines.count)
+        np.maximum.at(scans, part, lines.count)
         missed = self._coverage.missed(position_m, scans[numbers], total**-0.5)
-        rank = np.searchsorted(numbers, lines.emission)
-        own = clear[lines.emission]
+        rank = np.searchsorted(numbers, part)
+        own = clear[part]
         missed[rank[own], lines.monitor[own]] = 1.0
         plain = missed.prod(axis=1) >= _SILENCE_EXPLAINED
         clear[numbers[~plain]] = False
-        gathered.take_whole(numbers[plain], position_m[plain])
+        gathered.take_whole(part, numbers[plain], position_m[plain])
 
     def _weigh(
         self, gathered: "_Gathering", lines: BearingLines, crossings: Crossings, expected: Sequence[Expected]
     ) -> None:
-        """Weigh the pairings of one channel, part by part: lines that are connected by crossings."""
-        known = [(tuple(each.position_m.tolist()), upper(each.covariance_m2)) for each in expected]
-        heard = len(np.unique(lines.emission))
-        density = heard / (self._settings.channels * self._area_m2)
-        graph = coo_array((np.ones(len(crossings)), (crossings.first, crossings.second)), shape=(len(lines),) * 2)
-        part = connected_components(graph, directed=False)[1]
-        for each in np.unique(part[crossings.first]).tolist():
-            members = [_line(lines, number) for number in np.flatnonzero(part == each).tolist()]
-            meetings = [
-                (int(crossings.first[c]), int(crossings.second[c]), tuple(crossings.position_m[c].tolist()))
-                for c in np.flatnonzero(part[crossings.first] == each).tolist()
-            ]
-            gathered.take_pairing(self._pairer.pair(members, meetings, density, known))
+        """Weigh the pairings of one part."""
+        first, second = crossings.first.tolist(), crossings.second.tolist()
+        members = [_line(lines, number) for number in sorted({*first, *second})]
+        meetings = [*zip(first, second, map(tuple, crossings.position_m.tolist()), strict=True)]
+        emission = lines.emission[first[0]]
+        known = [
+            (tuple(each.position_m.tolist()), upper(each.covariance_m2)) for each in expected if each.emission == emission
+        ]
+        density = (int(lines.emission[-1]) + 1) / (self._settings.channels * self._area_m2)
+        gathered.take_pairing(self._pairer.pair(members, meetings, density, known))
+
+
+def _parts(crossings: Crossings, lines: int) -> Indices:
+    """Number of the part of each line: lines that crossings connect, directly or by others."""
+    edges = (np.ones(len(crossings), bool), (crossings.first, crossings.second))
+    part: Indices = connected_components(coo_array(edges, shape=(lines, lines)), directed=False)[1].astype(np.int64)
+    return part
 
 
 class _Gathering:
@@ -169,15 +172,18 @@ class _Gathering:
         self._line: list[Indices] = []
         self._emitter: list[Indices] = []
 
-    def take_whole(self, emission: Indices, position_m: Array) -> None:
-        """Take emissions (k,) with all their lines, each for one emitter at `position_m` (k, 2)."""
-        own = np.flatnonzero(np.isin(self._lines.emission, emission))
+    def take_whole(self, part: Indices, numbers: Indices, position_m: Array) -> None:
+        """Take parts `numbers` (k,) with all their lines, each for one emitter at `position_m` (k, 2)."""
+        own = np.flatnonzero(np.isin(part, numbers))
+        rank = np.searchsorted(numbers, part[own])
+        emission = np.zeros(len(numbers), np.int64)
+        emission[rank] = self._lines.emission[own]
         self._line.append(own)
-        self._emitter.append(np.searchsorted(emission, self._lines.emission[own]) + len(self._emission))
+        self._emitter.append(rank + len(self._emission))
         self._emission += emission.tolist()
         self._position_m += [*position_m]
-        self._probability += [1.0] * len(emission)
-        self._stated += [True] * len(emission)
+        self._probability += [1.0] * len(numbers)
+        self._stated += [True] * len(numbers)
 
     def take_pairing(self, pairing: Pairing) -> None:
         """Take what was weighed on one channel."""

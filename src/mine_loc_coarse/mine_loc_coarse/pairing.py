@@ -27,6 +27,8 @@ _MOST_CANDIDATES = 400
 _MOST_WAYS = 5000
 _SAME_PLACE = chi2_quantile(0.999, 2)
 _LEAST_PROBABILITY = 0.01
+_BEYOND_NOTICE = 9.0
+"""Ways that are e^9 times less probable than the best one are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,26 +225,34 @@ def _squared_distance(
 
 
 def _ways(numbers: Sequence[int], candidates: Sequence[Candidate]) -> list[tuple[float, tuple[int, ...]]]:
-    """Every way to use each line once, with its weight; the most promising ones first where there are too many."""
-    holding = {
-        number: sorted(
-            (index for index, candidate in enumerate(candidates) if number in candidate.lines),
-            key=lambda index: -candidates[index].log_weight,
-        )
-        for number in numbers
-    }
-    ways: list[tuple[float, tuple[int, ...]]] = []
+    """The ways to use each line once, with their weights, but those that the best one outweighs beyond notice.
 
-    def share_out(left: frozenset[int], weight: float, members: tuple[int, ...]) -> None:
+    Branch and bound: no way weighs more than the sum of the best shares that its lines can have.
+    """
+    bit = {number: 1 << place for place, number in enumerate(numbers)}
+    masks = [sum(bit[number] for number in candidate.lines) for candidate in candidates]
+    weights = [candidate.log_weight for candidate in candidates]
+    shares = [candidate.log_weight / len(candidate.lines) for candidate in candidates]
+    by_share = sorted(range(len(candidates)), key=lambda index: -shares[index])
+    holding = {each: [index for index in by_share if masks[index] & each] for each in bit.values()}
+    best_share = {each: shares[holding[each][0]] for each in bit.values()}
+    ways: list[tuple[float, tuple[int, ...]]] = []
+    best = -math.inf
+
+    def share_out(left: int, weight: float, bound: float, members: tuple[int, ...]) -> None:
+        nonlocal best
         if not left:
             ways.append((weight, members))
+            best = max(best, weight)
             return
-        for index in holding[min(left)]:
-            if len(ways) >= _MOST_WAYS:
-                return
-            candidate = candidates[index]
-            if candidate.lines <= left:
-                share_out(left - candidate.lines, weight + candidate.log_weight, (*members, index))
+        for index in holding[left & -left]:
+            mask = masks[index]
+            if mask & ~left:
+                continue
+            rest = bound - sum(best_share[each] for each in bit.values() if mask & each)
+            if weight + weights[index] + rest < best - _BEYOND_NOTICE or len(ways) >= _MOST_WAYS:
+                continue
+            share_out(left & ~mask, weight + weights[index], rest, (*members, index))
 
-    share_out(frozenset(numbers), 0.0, ())
-    return ways
+    share_out((1 << len(numbers)) - 1, 0.0, sum(best_share.values()), ())
+    return [way for way in ways if way[0] >= best - _BEYOND_NOTICE]
