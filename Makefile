@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion lock clean
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -42,6 +42,9 @@ bench-pdr: setup ## dead reckoning on recordings of waists and phones (bench/res
 
 bench-fusion: setup ## fusion against paper A, its rivals and GTSAM (bench/results/fusion.json)
 	@$(run) python bench/fusion.py
+
+bench-coarse: setup ## coarse regions in paper E's setting, with rivals (bench/results/coarse.json)
+	@$(run) python bench/coarse.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

@@ -35,10 +35,11 @@ class Score:
     distance_m: Array
     informed: Flags
     initial: int
-    extra: int
     ghosts: int
+    ghosts_of_nodes: int
     ambiguous: int
     seconds: float
+    cpu_seconds: float
     nodes: Flags
     all_nodes: Flags
 
@@ -66,6 +67,7 @@ def score(scene: Scene, answer: Answer, initial: Initial) -> Score:
     distance_m = np.hypot(*(scene.position_m[:, None] - scene.position_m).transpose(2, 0, 1))
     ghosts = len(answer.frequency_hz) - int(found.sum())
     hearable = scene.heard_by >= 2
+    sharp = hearable & (scene.predicted_ce95_m <= SHARP_M)
     return Score(
         error_m,
         radius_m,
@@ -78,12 +80,26 @@ def score(scene: Scene, answer: Answer, initial: Initial) -> Score:
         _informed(scene, initial),
         len(initial.emission),
         ghosts,
-        ghosts,
+        ghosts - _misplaced(scene, channel, matched, hearable & ~sharp),
         answer.ambiguous,
         answer.seconds,
-        hearable & (scene.predicted_ce95_m <= SHARP_M),
+        answer.cpu_seconds,
+        sharp,
         hearable,
     )
+
+
+def _misplaced(scene: Scene, channel: NDArray[np.int64], matched: NDArray[np.int64], others: Flags) -> int:
+    """Unmatched regions on the channels of unmatched nodes outside `nodes`, one a node: theirs, in a wrong place."""
+    free = np.ones(len(channel), bool)
+    free[matched[matched >= 0]] = False
+    count = 0
+    for node in np.flatnonzero(others & (matched < 0)).tolist():
+        own = np.flatnonzero(free & (channel == scene.channel[node]))
+        if len(own):
+            free[own[0]] = False
+            count += 1
+    return count
 
 
 def _informed(scene: Scene, initial: Initial) -> Flags:
@@ -108,15 +124,19 @@ def summary(scores: Sequence[Score], which: str) -> dict[str, Any]:
     informed = np.concatenate([each.informed[own] for each, own in zip(scores, chosen, strict=True)])
     clear, every = _topology(scores, chosen)
     redundant = sum(max(each.initial - int(each.informed.sum()), 0) for each in scores)
-    ghosts = np.array([each.ghosts for each in scores], float)
+    ghosts = np.array([each.ghosts if which == "all_nodes" else each.ghosts_of_nodes for each in scores], float)
     seconds = np.array([each.seconds for each in scores])
-    means_m = np.array([np.nanmean(e.error_m[own]) for e, own in zip(scores, chosen, strict=True) if np.isfinite(e.error_m[own]).any()])
+    means_m = np.array(
+        [np.nanmean(e.error_m[own]) for e, own in zip(scores, chosen, strict=True) if np.isfinite(e.error_m[own]).any()]
+    )
     figures: dict[str, Any] = {
         "scenes": len(scores),
         "count": len(error_m),
         "share": float(np.mean(np.concatenate(chosen))),
         "time_s": float(np.median(seconds)),
         "time_p95_s": float(np.percentile(seconds, 95)),
+        "cpu_time_s": float(np.median([each.cpu_seconds for each in scores])),
+        "cpu_time_p95_s": float(np.percentile([each.cpu_seconds for each in scores], 95)),
         "error_m": float(error_m[found].mean()),
         "error_m_sd_over_scenes": float(means_m.std(ddof=1)),
         "error_ce95_m": float(np.percentile(error_m[found], 95)),

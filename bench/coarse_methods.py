@@ -26,7 +26,8 @@ WIDE_PROBABILITY = 0.999
 class Answer:
     """What a method states: frequencies (k,), positions (k, 2), radii of 95 % and of 99.9 % (k,), seconds it took.
 
-    `ambiguous` is the number of regions that are flagged and state nothing; `neighbours` (k, k) who is near whom.
+    `cpu_seconds` is that of the processor alone, `ambiguous` the number of regions that are flagged and state nothing,
+    `neighbours` (k, k) who is near whom.
     """
 
     frequency_hz: Array
@@ -34,6 +35,7 @@ class Answer:
     radius_m: Array
     wide_m: Array
     seconds: float
+    cpu_seconds: float
     ambiguous: int
     neighbours: NDArray[np.bool_]
 
@@ -44,13 +46,11 @@ def coarse(scene: Scene) -> Answer:
     The time is that of a positioning which is given all the reports at once and forms the whole situation from them.
     """
     reports = [report for _, report in scene.sent]
-    began = time.perf_counter()
     fresh = CoarsePositioning(scene.monitors, SETTINGS)
-    ready = time.perf_counter()
+    began, cpu_began = time.perf_counter(), time.process_time()
     fresh.add(reports, scene.now_ns)
     fresh.situation(scene.now_ns)
-    seconds = time.perf_counter() - ready
-    del began
+    seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - cpu_began
     live, taken = CoarsePositioning(scene.monitors, SETTINGS), 0
     for now_ns in range(bc.ROUND_NS, scene.now_ns + 1, bc.ROUND_NS):
         arrived = taken
@@ -68,6 +68,7 @@ def coarse(scene: Scene) -> Answer:
         np.array([region.radius_m for region in stated]),
         region_radius_m(covariance, WIDE_PROBABILITY),
         seconds,
+        cpu_seconds,
         sum(region.status is Status.AMBIGUOUS for region in situation.regions),
         np.array([[other in region.neighbour_ids for other in ids] for region in stated], bool).reshape(len(ids), -1),
     )
@@ -97,9 +98,7 @@ def initial_set(scene: Scene) -> Initial:
     apart = reports.monitor[first] != reports.monitor[second]
     place_m = np.array([monitor.position_m[:2] for monitor in scene.monitors])[reports.monitor]
     variance = np.full(len(reports), SETTINGS.azimuth_sd_rad**2)
-    found = cross(
-        place_m, reports.azimuth_rad, variance, first[apart], second[apart], SETTINGS.detection_range_m
-    )
+    found = cross(place_m, reports.azimuth_rad, variance, first[apart], second[apart], SETTINGS.detection_range_m)
     emission_hz = np.bincount(emission, reports.middle_hz) / np.bincount(emission)
     return Initial(
         emission[found.first], reports.stamp_ns[found.first], found.position_m, found.covariance_m2, emission_hz
@@ -118,14 +117,16 @@ class DbscanTuning:
 
 def dbscan(scene: Scene, tuning: DbscanTuning) -> Answer:
     """Pairwise crossing, then DBSCAN on each frequency; a cluster is a node."""
-    began = time.perf_counter()
+    began, cpu_began = time.perf_counter(), time.process_time()
     initial = initial_set(scene)
     hz, places, radii = [], [], []
     for emission in np.unique(initial.emission).tolist():
         own = initial.emission == emission
         points = initial.position_m[own]
         label = DBSCAN(eps=tuning.eps_m, min_samples=tuning.min_samples).fit_predict(points)
-        weight = 1.0 / np.trace(initial.covariance_m2[own], axis1=1, axis2=2) if tuning.weighted else np.ones(len(points))
+        weight = (
+            1.0 / np.trace(initial.covariance_m2[own], axis1=1, axis2=2) if tuning.weighted else np.ones(len(points))
+        )
         for number in range(int(label.max()) + 1):
             members = label == number
             centre = np.average(points[members], axis=0, weights=weight[members])
@@ -133,22 +134,24 @@ def dbscan(scene: Scene, tuning: DbscanTuning) -> Answer:
             hz.append(initial.emission_hz[emission])
             places.append(centre)
             radii.append(tuning.radius_scale * max(scatter, 1.0))
-    return _answer(hz, places, np.array(radii), time.perf_counter() - began)
+    return _answer(hz, places, np.array(radii), time.perf_counter() - began, time.process_time() - cpu_began)
 
 
 def crossing_alone(scene: Scene) -> Answer:
     """Every crossing of the last round is a node."""
-    began = time.perf_counter()
+    began, cpu_began = time.perf_counter(), time.process_time()
     initial = initial_set(scene)
     last = initial.stamp_ns >= scene.now_ns - bc.LONGEST_DELAY_NS - bc.ROUND_NS
     radius_m = region_radius_m(initial.covariance_m2[last], 0.95)
     hz = initial.emission_hz[initial.emission[last]]
-    return _answer(hz.tolist(), [*initial.position_m[last]], radius_m, time.perf_counter() - began)
+    return _answer(
+        hz.tolist(), [*initial.position_m[last]], radius_m, time.perf_counter() - began, time.process_time() - cpu_began
+    )
 
 
-def _answer(hz: list[float], places: list[Array], radius_m: Array, seconds: float) -> Answer:
+def _answer(hz: list[float], places: list[Array], radius_m: Array, seconds: float, cpu_seconds: float) -> Answer:
     position_m = np.array(places).reshape(-1, 2)
     near = np.hypot(*(position_m[:, None] - position_m).transpose(2, 0, 1)) <= SETTINGS.communication_range_m
     np.fill_diagonal(near, val=False)
     # The circles of a two-dimensional Gaussian: 99.9 % is 3.72 σ, 95 % is 2.45 σ.
-    return Answer(np.array(hz), position_m, radius_m, radius_m * (3.717 / 2.448), seconds, 0, near)
+    return Answer(np.array(hz), position_m, radius_m, radius_m * (3.717 / 2.448), seconds, cpu_seconds, 0, near)

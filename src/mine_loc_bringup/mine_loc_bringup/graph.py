@@ -29,7 +29,7 @@ class NodeSpec:
 
     key: str
     package: str
-    per: Literal["site", "person_with_n100", "uwb_receiver", "relay"]
+    per: Literal["site", "person_with_n100", "uwb_receiver", "relay", "monitor_with_port", "site_with_monitors"]
     parameter_class: str
     name: str
     namespace: str = "/"
@@ -134,6 +134,10 @@ def _scopes(spec: NodeSpec, site: Site, people: People) -> Iterator[dict[str, An
         yield from ({"site": site, "receiver": receiver} for receiver in site.uwb_receivers)
     elif spec.per == "relay":
         yield from ({"site": site, "relay": relay} for relay in site.relays)
+    elif spec.per == "monitor_with_port":
+        yield from ({"site": site, "monitor": monitor} for monitor in site.monitors if monitor.port)
+    elif spec.per == "site_with_monitors":
+        yield from ({"site": site} for _ in site.monitors[:1])
     else:
         yield from ({"site": site, "person": person} for person in people if person.n100)
 

@@ -1,13 +1,14 @@
 """Coarse positioning of paper E, whole: reports in, situations out."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_coarse.emissions import emissions
-from mine_loc_coarse.emitter_fit import bearings_of, fit
+from mine_loc_coarse.emitter_fit import Bearings, Fits, bearings_of, fit
 from mine_loc_coarse.locator import Emitters, Expected, Locator
 from mine_loc_coarse.monitor_bias import MonitorBias
 from mine_loc_coarse.open_reports import OpenReports, Reports
@@ -19,6 +20,10 @@ from mine_loc_core.site import Gallery, Monitor
 from mine_loc_core.stamps import to_ns
 
 Array = NDArray[np.float64]
+_SPEED_SD = 0.5**0.5
+"""Of a walker's velocity on one axis, over the root mean square of the speed."""
+_BIAS_MATTERS = 0.02
+"""A change of a bias by less than this share of the noise is not worth another fit."""
 
 
 class CoarsePositioning:
@@ -78,9 +83,7 @@ class CoarsePositioning:
         spare = np.ones(len(reports), bool)
         spare[emitters.report] = False
         tracks = self._tracks.update(sightings, emission_hz, set(emission[spare].tolist()), now_ns)
-        return situation_of(
-            tracks, now_ns, s.region_probability, s.communication_range_m, self._ids, self._galleries
-        )
+        return situation_of(tracks, now_ns, s.region_probability, s.communication_range_m, self._ids, self._galleries)
 
     def _expected(self, emission_hz: Array, now_ns: int) -> list[Expected]:
         """Emitters that were stated before the window began: what the window's reports did not decide themselves."""
@@ -91,7 +94,11 @@ class CoarsePositioning:
             if track.stated_ns is not None and track.stated_ns < begin_ns and track.status is not Status.LOST
         ]
         return [
-            Expected(int(np.argmin(np.abs(emission_hz - track.sighting.frequency_hz))), track.state[:2], track.covariance[:2, :2])
+            Expected(
+                int(np.argmin(np.abs(emission_hz - track.sighting.frequency_hz))),
+                track.state[:2],
+                track.covariance[:2, :2],
+            )
             for track in old
             if len(emission_hz)
         ]
@@ -102,8 +109,14 @@ class CoarsePositioning:
         if not count:
             return []
         bearings = bearings_of(reports, emitters.report, emitters.emitter, self._place_m, now_ns)
-        speed = s.speed_m_s / 2.0**0.5
+        speed = s.speed_m_s * _SPEED_SD
         fits = fit(bearings, emitters.position_m, s.azimuth_sd_rad, s.detection_range_m, speed)
+        before_rad = self._bias.mean_rad
+        self._bias.learn(*_stated(bearings, fits, emitters.stated), now_ns, to_ns(s.window_s))
+        change_rad = self._bias.mean_rad - before_rad
+        if np.any(np.abs(change_rad) > _BIAS_MATTERS * s.azimuth_sd_rad):
+            bearings = replace(bearings, azimuth_rad=bearings.azimuth_rad - change_rad[bearings.monitor])
+            fits = fit(bearings, fits.state[:, :2], s.azimuth_sd_rad, s.detection_range_m, speed)
         heard = np.zeros((count, len(self._ids)), bool)
         heard[bearings.emitter, bearings.monitor] = True
         last_ns = np.zeros(count, np.int64)
@@ -124,6 +137,21 @@ class CoarsePositioning:
             )
             for k, emission in enumerate(emitters.emission.tolist())
         ]
+
+
+def _stated(bearings: Bearings, fits: Fits, stated: NDArray[np.bool_]) -> tuple[Bearings, Fits]:
+    """The bearings of stated emitters alone: the rivals of an ambiguous pairing teach nothing."""
+    if stated.all():
+        return bearings, fits
+    rank, own = np.cumsum(stated) - 1, stated[bearings.emitter]
+    kept = Bearings(
+        rank[bearings.emitter[own]],
+        bearings.monitor[own],
+        bearings.place_m[own],
+        bearings.age_s[own],
+        bearings.azimuth_rad[own],
+    )
+    return kept, Fits(fits.state[stated], fits.covariance[stated], fits.residual_rad[own], fits.jacobian[own])
 
 
 def _means(values: Array, group: NDArray[np.int64]) -> Array:

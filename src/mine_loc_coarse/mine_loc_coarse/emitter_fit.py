@@ -16,6 +16,8 @@ Indices = NDArray[np.int64]
 _ITERATIONS = 4
 _LEAST_DISTANCE_M = 10.0
 """Nearer than this the direction from a monitor says nothing of a place."""
+_LONGEST_STEP_M = 1000.0
+"""Nearly collinear bearings are not linear over more: unbounded steps run away along them."""
 _UPPER = np.triu_indices(4)
 
 
@@ -47,7 +49,7 @@ class Fits:
 def bearings_of(reports: Reports, report: Indices, emitter: Indices, place_m: Array, now_ns: int) -> Bearings:
     """Reports `report` (n,) of emitters `emitter` (n,) as bearings at `now_ns`; `place_m` (m, 2) are the monitors."""
     monitor = reports.monitor[report]
-    age_s = (now_ns - reports.stamp_ns[report]) * 1e-9
+    age_s = np.asarray((now_ns - reports.stamp_ns[report]) * 1e-9, np.float64)
     return Bearings(emitter, monitor, place_m[monitor], age_s, reports.azimuth_rad[report])
 
 
@@ -70,10 +72,12 @@ def fit(bearings: Bearings, start_m: Array, sd_rad: float, position_sd_m: float,
             information[:, row, column] = information[:, column, row] = summed
         gradient = np.stack([np.bincount(bearings.emitter, scaled[:, c] * residual, k) for c in range(4)], axis=1)
         gradient += (mean - state) @ prior
-        covariance = np.linalg.inv(information)
-        state = state + (covariance @ gradient[:, :, None])[:, :, 0]
+        covariance = np.asarray(np.linalg.inv(information), np.float64)
+        step = (covariance @ gradient[:, :, None])[:, :, 0]
+        length_m = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
+        state = state + step * np.minimum(1.0, _LONGEST_STEP_M / length_m)[:, None]
     residual, jacobian = _linearised(bearings, state)
-    return Fits(state, covariance, residual, jacobian)
+    return Fits(np.asarray(state, np.float64), covariance, residual, jacobian)
 
 
 def _linearised(bearings: Bearings, state: Array) -> tuple[Array, Array]:

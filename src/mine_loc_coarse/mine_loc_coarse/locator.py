@@ -130,7 +130,7 @@ class Locator:
         position_m = np.stack([x, y], axis=1)
         scans = np.zeros(len(clear))
         np.maximum.at(scans, part, lines.count)
-        missed = self._coverage.missed(position_m, scans[numbers], total**-0.5)
+        missed = self._coverage.missed(position_m, scans[numbers], np.sqrt(1.0 / total))
         rank = np.searchsorted(numbers, part)
         own = clear[part]
         missed[rank[own], lines.monitor[own]] = 1.0
@@ -147,7 +147,9 @@ class Locator:
         meetings = [*zip(first, second, map(tuple, crossings.position_m.tolist()), strict=True)]
         emission = lines.emission[first[0]]
         known = [
-            (tuple(each.position_m.tolist()), upper(each.covariance_m2)) for each in expected if each.emission == emission
+            (tuple(each.position_m.tolist()), upper(each.covariance_m2))
+            for each in expected
+            if each.emission == emission
         ]
         density = (int(lines.emission[-1]) + 1) / (self._settings.channels * self._area_m2)
         gathered.take_pairing(self._pairer.pair(members, meetings, density, known))

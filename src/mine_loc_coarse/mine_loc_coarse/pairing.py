@@ -182,10 +182,10 @@ class Pairer:
             if shares[way] < _LEAST_PROBABILITY:
                 break
             for candidate in emitters[way]:
-                if any(_same_place(candidate, other) for other in (*stated, *ambiguous)):
-                    # In the most probable way two emitters may well be in one place, on different lines.
-                    if not (way == np.argmax(shares) and all(candidate.lines.isdisjoint(o.lines) for o in stated)):
-                        continue
+                # In the most probable way two emitters may well be in one place, on different lines.
+                another = way == np.argmax(shares) and all(candidate.lines.isdisjoint(other.lines) for other in stated)
+                if not another and any(_same_place(candidate, other) for other in (*stated, *ambiguous)):
+                    continue
                 here = [any(_same_place(candidate, other) for other in each) for each in emitters]
                 probability = float(shares[here].sum())
                 judged = Candidate(

@@ -34,8 +34,8 @@ class CoarseSettings:
     region_probability: float = 0.95
 
     def __post_init__(self) -> None:
-        positive = ("detection_range_m", "communication_range_m", "azimuth_sd_rad", "frequency_accuracy_hz")
-        positive += ("speed_m_s", "window_s", "scan_s", "lost_after_s", "forget_after_s")
+        positive: tuple[str, ...] = ("detection_range_m", "communication_range_m", "azimuth_sd_rad")
+        positive += ("frequency_accuracy_hz", "speed_m_s", "window_s", "scan_s", "lost_after_s", "forget_after_s")
         for name in positive:
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ConfigurationError(f"{name}: {getattr(self, name):g}; allowed: above 0")

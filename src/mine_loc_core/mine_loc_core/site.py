@@ -120,10 +120,12 @@ class Zone:
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
-    """A direction-finding monitor (paper E)."""
+    """A direction-finding monitor (paper E). `port` is its serial line or TCP address, empty = read elsewhere."""
 
     id: int
     position_m: Point3
+    port: str = ""
+    baud: int = 115200
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +216,7 @@ def _site(content: Mapping[str, Any]) -> Site:
         vehicles=every("vehicles", _vehicle),
         turn_markers=every("turn_markers", _turn_marker),
         zones=every("zones", _zone),
-        monitors=every("monitors", lambda m: Monitor(m["id"], _point(m["position_m"]))),
+        monitors=every("monitors", _monitor),
         uwb_receivers=every("uwb_receivers", _uwb_receiver),
         relays=every("relays", _relay),
         discovery=Discovery(discovery.get("range", "localhost"), tuple(discovery.get("peers", []))),
@@ -258,6 +260,10 @@ def _zone(item: Mapping[str, Any]) -> Zone:
     distances = [float(item[key]) if key in item else None for key in ("warning_m", "danger_m")]
     corners, kind = _points(item.get("polygon_m", [])), ZoneType[item["type"].upper()]
     return Zone(item["id"], item.get("name", item["id"]), kind, corners, item.get("vehicle"), *distances)
+
+
+def _monitor(item: Mapping[str, Any]) -> Monitor:
+    return Monitor(item["id"], _point(item["position_m"]), item.get("port", ""), item.get("baud", 115200))
 
 
 def _turn_marker(item: Mapping[str, Any]) -> TurnMarker:

@@ -2,6 +2,7 @@
 
 import itertools
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from mine_loc_bringup.graph import NodeProcess, discovery_environment, expand, r
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.parameters import constraints
 from mine_loc_core.people import People, load_people
-from mine_loc_core.site import Discovery, load_site
+from mine_loc_core.site import Discovery, Monitor, load_site
 
 ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "config/example_mine"
@@ -37,11 +38,22 @@ def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_one_a_relay_
         "proximity",
         "relay_shuttle_car",
         "markers",
+        "coarse",
     ]
 
 
 def test_a_relay_s_node_is_told_which_one_it_is():
     assert node("relay_shuttle_car").parameters == {"site": str(FOLDER), "relay": "shuttle_car"}
+
+
+def test_a_monitor_with_a_port_has_a_driver_and_a_site_without_monitors_no_coarse_node():
+    with_port = replace(SITE, monitors=(Monitor(7, (0.0, 0.0, 2.0), "socket://10.0.0.7:4001", 9600),))
+    driver, coarse = (each for each in expand(with_port, PEOPLE, FOLDER) if each.key in {"monitor_driver", "coarse"})
+    assert driver.name == "monitor_driver_7"
+    assert driver.parameters == {"site": str(FOLDER), "port": "socket://10.0.0.7:4001", "baud": 9600}
+    assert coarse.name == "coarse"
+    without = expand(replace(SITE, monitors=()), PEOPLE, FOLDER)
+    assert not {"monitor_driver", "coarse"} & {process.key for process in without}
 
 
 def test_a_receiver_s_driver_is_told_its_line():
