@@ -51,7 +51,7 @@ def words_of(command: list[str], domain: int, log: Path) -> list[str]:
         ("n100_driver", "baud", "fast", ""),
         ("pdr", "odometry_rate", "0.0", "Hz"),
         ("synchroniser", "history_s", "1000.0", "0.1 to 30 s"),
-        ("fusion", "gate_probability", "1.5", "0.5 to 0.999999"),
+        ("fusion", "method", "guess", "mine_loc, los_weighted"),
         ("proximity", "valid_for_s", "60.0", "0.1 to 5 s"),
         ("proximity", "danger_leave", "0.5", "below danger_enter"),
         ("relay", "relay", "nobody", "no relay of this site"),

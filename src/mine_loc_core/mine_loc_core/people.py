@@ -37,7 +37,10 @@ class Stride:
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """One person. `name` is also the ROS namespace; `tag_id` 0 = wears none; `tag_height_m` None = as the site says."""
+    """One person. `name` is also the ROS namespace; `tag_id` 0 = wears none; `tag_height_m` None = as the site says.
+
+    `emitter_frequency_hz` is that of the radio which direction-finding monitors hear; None = carries none.
+    """
 
     name: str
     tag_id: int
@@ -45,6 +48,7 @@ class Person:
     n100: N100 | None
     stride: Stride
     tag_height_m: float | None
+    emitter_frequency_hz: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +121,7 @@ def _contradictions(source: YamlSource) -> Iterator[str]:
     yield from twice(source, "people", ("name",))
     yield from twice(source, "people", ("tag_id",), lambda tag: device_id(tag) or None)
     yield from twice(source, "people", ("n100", "port"))
+    yield from twice(source, "people", ("emitter_frequency_hz",))
 
 
 def _person(item: Mapping[str, Any]) -> Person:
@@ -127,6 +132,7 @@ def _person(item: Mapping[str, Any]) -> Person:
         n100=_n100(item["n100"]) if "n100" in item else None,
         stride=_stride(item.get("stride", {})),
         tag_height_m=float(item["tag_height_m"]) if "tag_height_m" in item else None,
+        emitter_frequency_hz=float(item["emitter_frequency_hz"]) if "emitter_frequency_hz" in item else None,
     )
 
 

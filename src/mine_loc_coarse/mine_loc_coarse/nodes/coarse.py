@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mine_loc_interfaces.msg import BearingArray, CoarseRegionArray, WakeAnchors
 
+from mine_loc_coarse.bearers import bearers_of
 from mine_loc_coarse.coarse_positioning import CoarsePositioning
 from mine_loc_coarse.nodes.messages import from_bearing, to_region
 from mine_loc_coarse.parameters import CoarseParameters
@@ -15,9 +16,11 @@ from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 
 _MOST_REGIONS = 4096
+_PEOPLE_PERIOD_S = 1.0
 
 
 class Coarse(NodeBase):
@@ -35,6 +38,7 @@ class Coarse(NodeBase):
         self._site = load_site(Path(self.parameters.site))
         if not self._site.monitors:
             raise ConfigurationError(f"{self._site.name}: monitors: none; allowed: at least one")
+        self._people = PeopleFile(Path(self.parameters.site))
         self._positioning = CoarsePositioning(self._site.monitors, self.parameters.settings(), self._site.galleries)
         carried = {anchor for vehicle in self._site.vehicles for anchor in vehicle.anchor_ids}
         self._anchors = [anchor for anchor in self._site.anchors if anchor.id not in carried]
@@ -42,6 +46,7 @@ class Coarse(NodeBase):
         self._wake = self.publish_to(WakeAnchors, "coarse/wake", EVENTS)
         self.subscribe(BearingArray, "coarse/bearings", self._on_bearings, EVENTS)
         self.every(self.parameters.period_s, self._publish)
+        self.every(_PEOPLE_PERIOD_S, self._people.poll)
         self._refused_before = 0
         self._told = 0
 
@@ -58,6 +63,8 @@ class Coarse(NodeBase):
         self._refused_before = total
         yield Health("situation", Level.OK, f"{self._told} regions", dict(self._positioning.figures))
         bias = {f"monitor_{number}_rad": f"{value:.4f}" for number, value in self._positioning.bias_rad.items()}
+        if self._people.error:
+            yield Health("people.yaml", Level.WARN, self._people.error)
         yield Health("monitor bias", Level.OK, "taken off the bearings", bias)
 
     def _on_bearings(self, message: BearingArray) -> None:
@@ -67,7 +74,8 @@ class Coarse(NodeBase):
         situation = self._positioning.situation(self.now_ns())
         regions = situation.regions[:_MOST_REGIONS]
         self._told = len(regions)
-        message = CoarseRegionArray(regions=[to_region(region) for region in regions])
+        bearers = bearers_of(regions, self._people.people, self.parameters.settings().frequency_accuracy_hz)
+        message = CoarseRegionArray(regions=[to_region(each, bearers.get(each.id, "")) for each in regions])
         message.header.stamp = to_time(situation.stamp_ns)
         message.header.frame_id = self._site.map_frame
         self._regions.publish(message)

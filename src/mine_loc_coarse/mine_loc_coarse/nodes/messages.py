@@ -42,10 +42,11 @@ def from_bearing(message: Bearing) -> BearingReport:
     )
 
 
-def to_region(region: Region) -> CoarseRegion:
-    """A region of the situation."""
+def to_region(region: Region, person: str) -> CoarseRegion:
+    """A region of the situation; `person` empty = nobody's that is known."""
     return CoarseRegion(
         region_id=region.id,
+        person=person,
         frequency=region.frequency_hz,
         center=to_point((*region.centre_m, 0.0)),
         covariance=region.covariance_m2.reshape(4),
