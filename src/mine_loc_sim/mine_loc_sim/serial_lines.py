@@ -3,6 +3,7 @@
 import contextlib
 import os
 import queue
+import select
 import socket
 import threading
 import time
@@ -15,6 +16,7 @@ from mine_loc_core.stamps import NS_PER_S
 from mine_loc_sim.timed_bytes import Arrival, Cable
 
 _BLOCKS_AHEAD = 2
+_FULL_S = 0.1
 
 
 class Line(Protocol):
@@ -40,6 +42,7 @@ class PseudoSerial:
     def __init__(self, port: Path) -> None:
         self.port = port
         self._master = self._slave = -1
+        self._read = True
         self.plug_in()
 
     @property
@@ -64,9 +67,20 @@ class PseudoSerial:
             os.close(end)
 
     def write(self, data: bytes) -> None:
-        """Send bytes; what nobody reads is lost, as on a real line."""
-        with contextlib.suppress(BlockingIOError, OSError):
-            os.write(self._master, data)
+        """Send bytes, more than the terminal holds (some kilobytes) as they are read.
+
+        What nobody reads is lost, as on a real line: a line that was full for a while is not waited for again until it
+        takes a whole message.
+        """
+        left = memoryview(data)
+        with contextlib.suppress(OSError):
+            while left:
+                try:
+                    left = left[os.write(self._master, left) :]
+                except BlockingIOError:
+                    if not (self._read and select.select([], [self._master], [], _FULL_S)[1]):
+                        break
+            self._read = not left
 
     def read(self) -> bytes:
         """What the other side wrote, nothing if nothing."""

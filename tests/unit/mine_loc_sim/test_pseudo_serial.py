@@ -55,6 +55,17 @@ def test_what_nobody_reads_does_not_block_the_player(tmp_path):
     line.unplug()
 
 
+def test_a_message_longer_than_the_terminal_holds_arrives_whole_as_it_is_read(tmp_path):
+    line, sent = PseudoSerial(tmp_path / "port"), bytes(range(256)) * 1024
+    device = os.open(line.port, os.O_RDWR | os.O_NOCTTY)
+    writer = threading.Thread(target=line.write, args=(sent,))
+    writer.start()
+    assert read(device, len(sent)) == sent
+    writer.join(PATIENCE_S)
+    os.close(device)
+    line.unplug()
+
+
 def test_bursts_are_played_in_order_not_before_their_time(tmp_path):
     line = PseudoSerial(tmp_path / "port")
     device = os.open(line.port, os.O_RDWR | os.O_NOCTTY)
