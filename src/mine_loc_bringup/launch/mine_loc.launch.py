@@ -11,7 +11,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from mine_loc_bringup.graph import discovery_environment, expand
+from mine_loc_bringup.graph import expand, node_environment
 from mine_loc_bringup.supervisor import FIRST_DELAY_S
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
@@ -29,7 +29,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             name=node.node_name,
             namespace=node.namespace,
             parameters=[*([str(node.parameter_file)] if node.parameter_file else []), dict(node.parameters)],
-            additional_env=discovery_environment(site.discovery),
+            additional_env=node_environment(site.discovery),
             output="screen",
             respawn=True,
             respawn_delay=FIRST_DELAY_S,

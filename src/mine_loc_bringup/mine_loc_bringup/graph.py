@@ -123,6 +123,14 @@ def discovery_environment(discovery: Discovery) -> dict[str, str]:
     }
 
 
+def node_environment(discovery: Discovery) -> dict[str, str]:
+    """Environment variables of every node: those of discovery, and one thread a node for products of small matrices.
+
+    OpenBLAS shares out even a product with one row, and then waits for its threads.
+    """
+    return {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"} | discovery_environment(discovery)
+
+
 def _given(spec: NodeSpec) -> frozenset[str]:
     return frozenset(spec.parameters) | {"site", "use_sim_time"}
 

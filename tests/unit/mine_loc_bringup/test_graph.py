@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from mine_loc_bringup.graph import NodeProcess, discovery_environment, expand, read_graph
+from mine_loc_bringup.graph import NodeProcess, discovery_environment, expand, node_environment, read_graph
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.parameters import constraints
 from mine_loc_core.people import People, load_people
@@ -141,6 +141,12 @@ def test_discovery_is_quick_unless_the_user_has_a_profile(monkeypatch):
     assert Path(discovery_environment(Discovery())[variable]).is_file()
     monkeypatch.setenv(variable, "/etc/own.xml")
     assert discovery_environment(Discovery())[variable] == "/etc/own.xml"
+
+
+def test_a_node_multiplies_small_matrices_with_one_thread():
+    environment = node_environment(Discovery())
+    assert environment["OPENBLAS_NUM_THREADS"] == environment["OMP_NUM_THREADS"] == "1"
+    assert discovery_environment(Discovery()).items() <= environment.items()
 
 
 @pytest.mark.parametrize("spec", read_graph(), ids=lambda spec: spec.key)

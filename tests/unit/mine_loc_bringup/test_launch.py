@@ -7,7 +7,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from mine_loc_bringup.graph import discovery_environment, expand
+from mine_loc_bringup.graph import expand, node_environment
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
 
@@ -64,6 +64,6 @@ def test_its_nodes_are_those_of_the_graph(launch_file, sim_time):
     assert [
         ([n.executable, *n.arguments], n.name, n.namespace, n.parameters, n.additional_env, n.respawn) for n in nodes
     ] == [
-        (w.command[:3], w.node_name, w.namespace, [w.parameters], discovery_environment(site.discovery), True)
+        (w.command[:3], w.node_name, w.namespace, [w.parameters], node_environment(site.discovery), True)
         for w in wanted
     ]

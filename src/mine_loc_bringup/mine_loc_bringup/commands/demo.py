@@ -32,7 +32,7 @@ from mine_loc_bringup.demo import generated, isas_walk, trek_lab
 from mine_loc_bringup.demo.recording import DATA_VARIABLE, Recording
 from mine_loc_bringup.demo.report import PersonReport, Track, person_report, plot, together
 from mine_loc_bringup.demo.table import people_table
-from mine_loc_bringup.graph import discovery_environment, expand
+from mine_loc_bringup.graph import expand, node_environment
 from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.errors import ConfigurationError
@@ -108,7 +108,7 @@ class _Demo:
         site, people = load_site(self._folder), PeopleFile(self._folder).people
         commands = {node.name: node.command for node in expand(site, people, self._folder)}
         self._watch = DemoWatch([person.name for person in people], self._out / "bag")
-        supervisor = Supervisor(discovery_environment(site.discovery), self._on_event, self._console.line)
+        supervisor = Supervisor(node_environment(site.discovery), self._on_event, self._console.line)
         self._players = [Player(self._lines[name], arrivals) for name, arrivals in self._recording.lines.items()]
         interrupted = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):

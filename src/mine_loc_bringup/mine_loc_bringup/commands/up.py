@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mine_loc_bringup.console import Console
-from mine_loc_bringup.graph import discovery_environment, expand
+from mine_loc_bringup.graph import expand, node_environment
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import People, PeopleFile
@@ -60,7 +60,7 @@ async def _run(arguments: argparse.Namespace) -> int:
             killed.append(event.name)
 
     wanted = commands(people_file.people)
-    supervisor = Supervisor(discovery_environment(site.discovery), on_event, console.line)
+    supervisor = Supervisor(node_environment(site.discovery), on_event, console.line)
     stop = _stop_on_signals()
     await supervisor.set_commands(wanted)
     following = asyncio.create_task(_follow(people_file, commands, supervisor, console))
