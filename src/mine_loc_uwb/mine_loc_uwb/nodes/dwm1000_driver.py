@@ -1,6 +1,7 @@
 """The serial line of a DW1000 kit: bytes to ranges, time differences and CIR frames."""
 
 import sys
+import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,7 +12,7 @@ from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.node_base import NodeBase, run
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
-from mine_loc_core.serial_link import SerialLink
+from mine_loc_core.serial_link import Chunk, SerialLink
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_uwb.device_stamps import DeviceStamps
@@ -26,11 +27,10 @@ class Dwm1000Driver(NodeBase):
     """Reads one port for ever and publishes what its messages say, stamped with the instant of measurement."""
 
     parameter_class = Dwm1000DriverParameters
-    needs_guard_condition = True
 
     def __init__(self) -> None:
         super().__init__("dwm1000_driver")
-        self._arrived = self.create_guard_condition(self.guarded(self._read, "serial data"))
+        self._decoding = threading.Lock()  # the reader's thread decodes and publishes; the executor does the rest
 
     def configure(self) -> None:
         """Create publishers; nothing is opened yet. A receiver that site.yaml does not know refuses the transition."""
@@ -51,7 +51,8 @@ class Dwm1000Driver(NodeBase):
         self._messages = 0
         self._losses_before = 0
         self._last_message = time.monotonic()
-        self._link = SerialLink(p.port, p.baud, clock=self.now_ns, wake=self._arrived.trigger)
+        read = self.guarded(self._read, "serial data")
+        self._link = SerialLink(p.port, p.baud, clock=self.now_ns, wake=read)
         self._link.start()
 
     def deactivate(self) -> None:
@@ -60,11 +61,13 @@ class Dwm1000Driver(NodeBase):
 
     def parameters_changed(self) -> None:
         """Latency and trust in the device's clock take effect at once."""
-        self._stamps = self._new_stamps()
+        with self._decoding:
+            self._stamps = self._new_stamps()
 
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Offsets learnt against the old time are void."""
-        self._stamps.forget()
+        with self._decoding:
+            self._stamps.forget()
 
     def health(self) -> Iterable[Health]:
         """The line, and what is decoded from it."""
@@ -93,15 +96,19 @@ class Dwm1000Driver(NodeBase):
         return DeviceStamps(latency_ns=latency_ns, trust_device_clock=self.parameters.trust_device_clock)
 
     def _read(self) -> None:
-        for chunk in self._link.take():
-            if not chunk.data:
-                self._decoder.reset()
-                self._starter.reset()
-                self._stamps.forget()
-                continue
-            self._starter.observe(chunk.data)
-            for message in self._decoder.feed(chunk.data):
-                self._publish(message, chunk.arrival_ns)
+        with self._decoding:
+            for chunk in self._link.take():
+                self._decode(chunk)
+
+    def _decode(self, chunk: Chunk) -> None:
+        if not chunk.data:
+            self._decoder.reset()
+            self._starter.reset()
+            self._stamps.forget()
+            return
+        self._starter.observe(chunk.data)
+        for message in self._decoder.feed(chunk.data):
+            self._publish(message, chunk.arrival_ns)
 
     def _publish(self, message: Message, arrival_ns: int) -> None:
         self._messages += 1
@@ -140,7 +147,9 @@ class Dwm1000Driver(NodeBase):
 
     def _talk(self) -> None:
         alive = time.monotonic() - self._last_message < self.parameters.silence_s
-        self._link.write(self._starter.poll(time.monotonic_ns(), stream_alive=alive))
+        with self._decoding:
+            words = self._starter.poll(time.monotonic_ns(), stream_alive=alive)
+        self._link.write(words)
 
 
 def main() -> int:
