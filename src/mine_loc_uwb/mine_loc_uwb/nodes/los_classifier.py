@@ -3,8 +3,9 @@
 import os
 import sys
 import threading
+import time
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -23,6 +24,8 @@ from mine_loc_uwb.parameters import LosClassifierParameters
 
 _MOST_WAITING = 1024
 """Frames that wait for judgement; the oldest are given up beyond."""
+_GATHER_S = 2e-4
+"""So long after a frame the others of its round are there; one batch of four costs a third of four batches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,34 +37,65 @@ class _Model:
     problem: str = ""
 
 
+class _Worker(threading.Thread):
+    """Prepares, and then works whenever it was woken, until it is ended."""
+
+    def __init__(self, prepare: Callable[[], None], work: Callable[[], None]) -> None:
+        super().__init__(daemon=True)
+        self._prepare, self._work = prepare, work
+        self._woken = threading.Event()
+        self._ended = False
+
+    def run(self) -> None:
+        """Of the thread."""
+        self._prepare()
+        while True:
+            self._woken.wait()
+            if self._ended:
+                return
+            time.sleep(_GATHER_S)
+            self._woken.clear()
+            self._work()
+
+    def wake(self) -> None:
+        """There is work."""
+        self._woken.set()
+
+    def end(self) -> None:
+        """There will be no more."""
+        self._ended = True
+        self._woken.set()
+
+
 class LosClassifier(NodeBase):
     """Judges what has arrived, as one batch; by the power rule if no model can be had."""
 
     parameter_class = LosClassifierParameters
-    needs_guard_condition = True
 
     def __init__(self) -> None:
         super().__init__("los_classifier")
-        self._arrived = self.create_guard_condition(self.guarded(self._judge, "judgement"))
+        self._worker: _Worker | None = None
 
     def configure(self) -> None:
-        """Begin to load the model. Frames wait until it is there."""
+        """Begin to load the model, in the thread that is going to judge. Frames wait until it is there."""
+        if self._worker is not None:
+            self._worker.end()
         self._model: _Model | None = None
-        self._loaded: deque[_Model] = deque()
-        # torch takes seconds to import, in which the node must answer and be able to stop
-        threading.Thread(target=self._load, args=(self._loaded,), daemon=True).start()
         self._waiting: deque[CirFrame] = deque(maxlen=_MOST_WAITING)
         self._judged = 0
         self._refused: Counter[str] = Counter()
         self._states = self.publish_to(LinkState, "uwb/link_state", EVENTS)
         self._info = self.publish_to(LosModelInfo, "~/model_info", LATCHED)
+        # torch takes seconds to import, in which the node must answer and be able to stop
+        self._worker = _Worker(self._load, self.guarded(self._judge, "judgement"))
+        self._worker.start()
         self.subscribe(CirFrame, "uwb/cir", self._on_frame, EVENTS)
 
     def activate(self) -> None:
         """Take up what came while the node was inactive."""
         if self._model is not None:
             self._announce(self._model)
-        self._arrived.trigger()
+        self._worker.wake()
 
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Histories before and after do not belong together."""
@@ -78,13 +112,17 @@ class LosClassifier(NodeBase):
         else:
             yield Health("model", Level.OK, str(self._model.card.get("version", "")), figures)
 
-    def _load(self, loaded: deque[_Model]) -> None:
+    def _load(self) -> None:
         path = Path(self.parameters.model) if self.parameters.model else _shipped_model()
         try:
-            loaded.append(_Model(*load_classifier(path, self.parameters.device)))
+            model = _Model(*load_classifier(path, self.parameters.device))
         except Exception as error:  # noqa: BLE001 whatever is wrong with it, the power rule serves
-            loaded.append(_Model(None, {}, str(error) or repr(error)))
-        self._arrived.trigger()
+            model = _Model(None, {}, str(error) or repr(error))
+            self.get_logger().warning(f"no model, the power rule serves: {model.problem}")
+        self._links = LinkJudge(model.classifier)
+        self._model = model
+        if self.active:  # otherwise `activate` does
+            self._announce(model)
 
     def _announce(self, model: _Model) -> None:
         info = LosModelInfo(
@@ -100,19 +138,10 @@ class LosClassifier(NodeBase):
         if len(self._waiting) == _MOST_WAITING:
             self._refused["overflow"] += 1
         self._waiting.append(frame)
-        self._arrived.trigger()
+        self._worker.wake()
 
     def _judge(self) -> None:
-        if self._model is None and self._loaded:
-            self._model = self._loaded.popleft()
-            self._links = LinkJudge(self._model.classifier)
-            if self._model.problem:
-                self.get_logger().warning(f"no model, the power rule serves: {self._model.problem}")
-            self._announce(self._model)
-        if self._model is None:
-            return
-        waiting = list(self._waiting)
-        self._waiting.clear()
+        waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
         for _, group in groupby(waiting, tap_count):
             self._judge_batch(list(group))
 
