@@ -84,13 +84,18 @@ def _by_powers(first_path_dbm: float, receive_dbm: float) -> Judgement:
 
 
 def load_classifier(path: Path, device: str) -> tuple[Classifier, dict[str, Any]]:
-    """Read a model for live use on "cpu" (one thread) or "cuda"; returns it and its card.
+    """Read a model for live use on "cpu" (compiled, one thread) or "cuda" (torch); returns it and its card.
 
     torch is imported here, so that nodes without a model do not pay for it. Raises ConfigurationError for a file that
     is no model and for "cuda" where there is none, ImportError without torch or safetensors.
     """
-    from mine_loc_uwb.los_inference import TorchClassifier  # noqa: PLC0415
     from mine_loc_uwb.los_model_file import load_model  # noqa: PLC0415
 
     network, card = load_model(path)
+    if device == "cpu":
+        from mine_loc_uwb.los_kernel import KernelClassifier, weights_of  # noqa: PLC0415
+
+        return KernelClassifier(weights_of(network.state_dict())), card
+    from mine_loc_uwb.los_inference import TorchClassifier  # noqa: PLC0415
+
     return TorchClassifier(network, device), card

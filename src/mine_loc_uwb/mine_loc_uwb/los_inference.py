@@ -1,4 +1,4 @@
-"""The trained network in live use."""
+"""The trained network in live use by torch, for a GPU; `los_kernel` is for the processor."""
 
 import warnings
 

@@ -122,7 +122,9 @@ class UwbSolver(NodeBase):
         if fix is not None:
             self._fixes += fix.status is FixStatus.OK
             self._poses.publish(to_pose(fix, array, self._frame.name, method, len(refused)))
-        self._verdicts.publish(to_verdict_array(verdicts, array.header.stamp, self._frame.name, tag_id=array.tag_id))
+        if self._verdicts.get_subscription_count():
+            judged = to_verdict_array(verdicts, array.header.stamp, self._frame.name, tag_id=array.tag_id)
+            self._verdicts.publish(judged)
 
     def _height_m(self, tag_id: int) -> float | None:
         if self._site.dimensions == 3:
