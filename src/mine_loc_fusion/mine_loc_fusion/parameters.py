@@ -12,7 +12,7 @@ class SynchroniserParameters(NodeParameters):
     """Time alignment."""
 
     companion_wait_ms: float = parameter(
-        8.0, "how long a ranging round waits for its position and link states", unit="ms", low=0.0, high=200.0
+        8.0, "how long a ranging round waits for its link states, or else its position", unit="ms", low=0.0, high=200.0
     )
     history_s: float = parameter(
         2.0, "inputs older than the last epoch by more are stale", unit="s", low=0.1, high=30.0

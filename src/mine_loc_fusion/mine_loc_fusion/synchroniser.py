@@ -1,8 +1,8 @@
 """Time alignment: inputs of many sources become epochs of one person, in order, each input used exactly once.
 
-A ranging round opens an epoch, which goes out as soon as its companions (the position solved from it, its link states)
-are there or a few milliseconds have passed. What is late by nature (steps) is not waited for: it follows in an epoch
-marked late, and the fusion corrects with it.
+A ranging round opens an epoch, which goes out as soon as its companions are there (its link states or, where nobody
+judges links, the position solved from it) or a few milliseconds have passed. What is late by nature (steps) is not
+waited for: it follows in an epoch marked late, and the fusion corrects with it.
 """
 
 from collections import Counter, OrderedDict
@@ -96,6 +96,7 @@ class Synchroniser:
         self._future_ns = future_ns
         self._max_open = max_open
         self._people: dict[str, _Person] = {}
+        self._waiting: dict[str, None] = {}  # whose epochs are open, in order of opening
         self.used = 0
         self.refused: Counter[Reason] = Counter()
         self.late = 0
@@ -103,7 +104,7 @@ class Synchroniser:
     @property
     def waiting(self) -> bool:
         """Whether an epoch is open."""
-        return any(person.open for person in self._people.values())
+        return bool(self._waiting)
 
     def push(self, item: SyncInput, now_ns: int) -> tuple[list[Epoch], Reason]:
         """Take an input; the epochs that are complete now, and whether the input was taken (ACCEPTED) or why not."""
@@ -119,23 +120,26 @@ class Synchroniser:
         if epoch is None:
             wait_ns = self._companion_wait_ns if item.kind in (Kind.RANGES, *_COMPANIONS) else 0
             epoch = person.open[item.stamp_ns] = _Open(item.stamp_ns, now_ns + wait_ns, item.links)
+            self._waiting[item.person] = None
         epoch.links = max(epoch.links, item.links)
         epoch.inputs.setdefault(item.kind, []).append(item.payload)
         return self._emit(item.person, person, now_ns), reason
 
     def poll(self, now_ns: int) -> list[Epoch]:
         """The epochs whose time to wait is over."""
-        return [epoch for name, person in self._people.items() for epoch in self._emit(name, person, now_ns)]
+        return [epoch for name in list(self._waiting) for epoch in self._emit(name, self._people[name], now_ns)]
 
     def reset(self) -> None:
         """Time jumped: forget all stamps. What was open is lost and counted as overflow."""
         for person in self._people.values():
             self._count_lost(person)
         self._people = {name: _Person(seq=person.seq) for name, person in self._people.items()}
+        self._waiting.clear()
 
     def forget(self, person: str) -> None:
         """Release a person who is no longer in the people file."""
         gone = self._people.pop(person, None)
+        self._waiting.pop(person, None)
         if gone is not None:
             self._count_lost(gone)
 
@@ -189,11 +193,14 @@ class Synchroniser:
             epochs.append(Epoch(name, person.seq, stamp_ns, late, opened.inputs))
             if not late:
                 person.last_stamp_ns = stamp_ns
+        if not person.open:
+            del self._waiting[name]
         return epochs
 
     def _complete(self, person: _Person, epoch: _Open, now_ns: int) -> bool:
         if Kind.RANGES not in epoch.inputs:
             return False
         heard_ns = person.link_state_heard_ns
-        expected = epoch.links if heard_ns is not None and now_ns - heard_ns < _LINK_STATES_EXPECTED_NS else 0
-        return Kind.UWB_POSE in epoch.inputs and len(epoch.inputs.get(Kind.LINK_STATE, ())) >= expected
+        if epoch.links and heard_ns is not None and now_ns - heard_ns < _LINK_STATES_EXPECTED_NS:
+            return len(epoch.inputs.get(Kind.LINK_STATE, ())) >= epoch.links
+        return Kind.UWB_POSE in epoch.inputs

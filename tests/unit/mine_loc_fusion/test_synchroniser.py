@@ -60,6 +60,34 @@ def test_link_states_are_waited_for_while_they_are_known_to_come_and_no_longer()
     assert len(subject.push(item(Kind.UWB_POSE, 5000, seq=1), at(5002))[0]) == 1
 
 
+def test_a_round_whose_links_are_judged_does_not_wait_for_its_position():
+    subject = synchroniser()
+    subject.push(item(Kind.LINK_STATE, 0, source=1), at(1))
+    subject.push(item(Kind.RANGES, 0, links=1), at(2))
+    subject.push(item(Kind.RANGES, 100, seq=1, links=1), at(102))
+    (epoch,), _ = subject.push(item(Kind.LINK_STATE, 100, source=1, seq=1), at(103))
+    assert set(epoch.inputs) == {Kind.RANGES, Kind.LINK_STATE}
+    subject.push(item(Kind.UWB_POSE, 100, seq=1), at(104))
+    (late,) = subject.poll(at(112))
+    assert (late.late, set(late.inputs)) == (True, {Kind.UWB_POSE})
+    assert not subject.waiting
+
+
+def test_those_who_wait_are_polled_until_their_time_is_over_and_forgotten_with_a_reset():
+    subject = synchroniser()
+    for person in ("ann", "bob"):
+        subject.push(item(Kind.RANGES, 0, person=person), at(0))
+    assert [epoch.person for epoch in subject.poll(at(8))] == ["ann", "bob"]
+    assert not subject.waiting
+    subject.push(item(Kind.RANGES, 100, seq=1, person="ann"), at(100))
+    subject.push(item(Kind.RANGES, 100, seq=1, person="bob"), at(100))
+    subject.forget("ann")
+    assert subject.waiting
+    subject.reset()
+    assert not subject.waiting
+    assert subject.poll(at(200)) == []
+
+
 def test_a_step_is_not_waited_for_and_comes_in_an_epoch_marked_late():
     subject = synchroniser()
     subject.push(item(Kind.RANGES, 400), at(400))
