@@ -10,6 +10,7 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from mine_loc_interfaces import msg
 from mine_loc_interfaces.srv import Reset, SetPose, ToggleSensor
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from mine_loc_core.health import Health, Level
@@ -132,7 +133,7 @@ class Fusion(NodeBase):
         if epoch.steps:
             position = epoch.steps[-1].position
             tracked.odom_position_m = (position.x, position.y, position.z)
-        if verdicts:
+        if verdicts and self._verdicts.get_subscription_count():
             stamp, frame = epoch.header.stamp, self._site.map_frame
             self._verdicts.publish(to_verdict_array(verdicts, stamp, frame, person=epoch.person))
         if not epoch.late:
@@ -167,20 +168,23 @@ class Fusion(NodeBase):
         array = msg.PersonPoseArray(instance=self.parameters.instance)
         array.header.frame_id = self._site.map_frame
         array.header.stamp = to_time(max(estimate.stamp_ns for _, estimate in outputs))
-        transforms = TFMessage()
+        transforms, follow = TFMessage(), self._tf.get_subscription_count()
         for tracked, estimate in outputs:
             person = tracked.person
             height_m = self._height_m(tracked) if estimate.height_m is None else estimate.height_m
             mode = tracked.mode_of(estimate)
             pose = to_person_pose(person.name, person.tag_id, estimate, height_m, tracked.los_fraction, mode)
             array.people.append(pose)
-            stamped = PoseWithCovarianceStamped(pose=pose.pose)
-            stamped.header.frame_id = self._site.map_frame
-            stamped.header.stamp = pose.stamp
-            self._pose_publishers[person.name].publish(stamped)
-            transforms.transforms.extend(self._transforms(tracked, estimate))
+            publisher = self._pose_publishers[person.name]
+            if publisher.get_subscription_count():
+                stamped = PoseWithCovarianceStamped(pose=pose.pose)
+                stamped.header = Header(stamp=pose.stamp, frame_id=self._site.map_frame)
+                publisher.publish(stamped)
+            if follow:
+                transforms.transforms.extend(self._transforms(tracked, estimate))
         self._array.publish(array)
-        self._tf.publish(transforms)
+        if follow:
+            self._tf.publish(transforms)
 
     def _transforms(self, tracked: TrackedPerson, estimate: Estimate) -> Iterable:
         """map → odom, placed so that odom → base_link (of dead reckoning) ends at the estimate (REP 105)."""
@@ -201,6 +205,8 @@ class Fusion(NodeBase):
     def _each_second(self) -> None:
         if self._people.poll() is not None:
             self._take_people()
+        if not self._health.get_subscription_count():
+            return
         now_ns = self.now_ns()
         for name, tracked in self._tracked.items():
             self._health.publish(self._to_health(name, tracked, now_ns))
