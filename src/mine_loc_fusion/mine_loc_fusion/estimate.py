@@ -1,7 +1,7 @@
 """What every estimator takes and answers."""
 
 from dataclasses import dataclass
-from math import inf, isfinite, nan, sqrt
+from math import hypot, inf, isfinite, nan, sqrt
 from typing import Any, Protocol
 
 import numpy as np
@@ -125,5 +125,6 @@ def ce95_m(covariance_m2: Array) -> float:
 
     Exact for a circular distribution; for a long one the quantile of its longer axis, which is never less.
     """
-    largest = float(np.linalg.eigvalsh(covariance_m2)[-1])
+    (xx, xy), (_, yy) = covariance_m2.tolist()
+    largest = 0.5 * (xx + yy) + hypot(0.5 * (xx - yy), xy)
     return sqrt(max(largest, 0.0) * chi2_quantile(0.95, 2))
