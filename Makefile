@@ -1,7 +1,8 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse lock clean
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live lock \
+    clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -45,6 +46,9 @@ bench-fusion: setup ## fusion against paper A, its rivals and GTSAM (bench/resul
 
 bench-coarse: setup ## coarse regions in paper E's setting, with rivals (bench/results/coarse.json)
 	@$(run) python bench/coarse.py
+
+bench-live: setup ## latency, fleets and load of the live graph on two cores (bench/results/live.json)
+	@$(run) python bench/live.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

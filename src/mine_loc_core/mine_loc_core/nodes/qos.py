@@ -3,7 +3,7 @@
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 EVENTS = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-"""Rounds, link states, steps, epochs, poses, verdicts: none may be lost on the way, not of 200 people in half a second."""
+"""Rounds, link states, steps, epochs, poses, verdicts: none may be lost, not even half a second of 200 people."""
 
 STREAM = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Subscriptions to IMU samples and CIR frames: a lost one is better than a queue."""
