@@ -79,15 +79,6 @@ def take_place(x: Array, P: Array, place_m: Array, covariance_m2: Array, gate: f
 
 
 @njit(cache=True)
-def take_velocity(x: Array, P: Array, dimensions: int, variance_m2_s2: float) -> None:
-    """Update (x, P) by standing still, horizontally."""
-    d = dimensions
-    HP = P[d : d + 2, :].copy()
-    S = HP[:, d : d + 2] + variance_m2_s2 * np.eye(2)
-    correct(x, P, HP, S, -x[d : d + 2], math.inf)
-
-
-@njit(cache=True)
 def correct(x: Array, P: Array, HP: Array, S: Array, error: Array, gate: float) -> float:
     """Kalman update by a measurement of two components, given H P (2, n), S (2, 2) and the innovation (2,)."""
     determinant = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
