@@ -14,7 +14,16 @@ import numpy as np
 from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import to_ns, to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PositionFix, StepFix, is_position, is_step
+from mine_loc_fusion.estimate import (
+    Array,
+    EpochInputs,
+    Estimate,
+    PositionFix,
+    StepFix,
+    is_position,
+    is_step,
+    symmetric,
+)
 from mine_loc_fusion.yaw_alignment import YawAlignment
 
 _VELOCITY_FADE_S = 3.0
@@ -61,7 +70,7 @@ class Ekf:
         yaw_rad, yaw_variance = yaw or (0.0, math.pi**2)
         self._x = np.array([position_m[0], position_m[1], 0.0, 0.0, yaw_rad])
         self._P = np.diag([0.0, 0.0, _WALKING_SD_MS**2, _WALKING_SD_MS**2, yaw_variance])
-        self._P[:2, :2] = covariance_m2
+        self._P[:2, :2] = symmetric(covariance_m2)
         self._stamp_ns = stamp_ns
         self._alignment.forget_places()
 
@@ -120,7 +129,7 @@ class Ekf:
     def _use_position(self, fix: PositionFix, stamp_ns: int) -> Verdict:
         if not is_position(fix.position_m, fix.covariance_m2):
             return Verdict(Source.UWB_POSE, 0, Reason.INVALID)
-        R = (fix.covariance_m2 + fix.covariance_m2.T) / 2.0 + np.eye(2) * self._s.position_sd_m**2
+        R = symmetric(fix.covariance_m2) + np.eye(2) * self._s.position_sd_m**2
         if self._stamp_ns is None:
             self.begin(stamp_ns, fix.position_m, R, None)
             self._uwb_ns = stamp_ns

@@ -113,6 +113,12 @@ def is_position(position_m: Array, covariance_m2: Array) -> bool:
     return bool(finite and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T)[0] > 0.0)
 
 
+def symmetric(covariance: Array) -> Array:
+    """The covariance without what its two halves disagree in."""
+    mean: Array = (covariance + covariance.T) / 2.0
+    return mean
+
+
 def is_step(step: StepFix) -> bool:
     """Whether this is a step that a person can make, with variances."""
     variances = step.length_variance_m2, step.heading_variance_rad2

@@ -16,7 +16,16 @@ from mine_loc_core.stamps import to_ns, to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion import step_kernel
-from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PlaceFix, StepFix, is_position, is_step
+from mine_loc_fusion.estimate import (
+    Array,
+    EpochInputs,
+    Estimate,
+    PlaceFix,
+    StepFix,
+    is_position,
+    is_step,
+    symmetric,
+)
 from mine_loc_fusion.gallery_walls import between_walls
 from mine_loc_fusion.step_kernel import OWN_STATES, SCALE, YAW
 from mine_loc_fusion.tightly_coupled_settings import TightlyCoupledSettings
@@ -27,6 +36,8 @@ from mine_loc_uwb.robust_tracker import RobustTracker
 _SAME_STRIKE_S = 0.05
 _STRIKE_SD_M = 0.03
 """Where the waist is at a heel strike, against the step's ends."""
+_LEAST_SD_M = 1e-3
+"""Nobody is placed better; what claims to would leave a covariance of nothing but rounding."""
 _HEIGHT_SD_M = 2.0
 _RANGES_HOLD_NS = to_ns(1.0)
 """A position beside ranges not older is made of them."""
@@ -66,6 +77,7 @@ class TightlyCoupled:
 
     def begin(self, stamp_ns: int, position_m: Array, covariance_m2: Array, yaw: tuple[float, float] | None) -> None:
         """See Estimator."""
+        covariance_m2 = _believable(covariance_m2)
         if self._height_m is not None:
             position_m = np.append(position_m, self._height_m)
             covariance_m2 = np.pad(covariance_m2, ((0, 1), (0, 1)))
@@ -181,7 +193,8 @@ class TightlyCoupled:
             return Verdict(place.source, 0, Reason.ACCEPTED)
         tracker = self._tracker
         innovation_m = float(np.linalg.norm(place.position_m - tracker.x[:2]))
-        d2 = step_kernel.take_place(tracker.x, tracker.P, place.position_m, place.covariance_m2, self._gate)
+        noise_m2 = _believable(place.covariance_m2)
+        d2 = step_kernel.take_place(tracker.x, tracker.P, place.position_m, noise_m2, self._gate)
         reason = Reason.ACCEPTED if d2 <= self._gate else Reason.GATE
         return Verdict(place.source, 0, reason, d2, self._gate, 2, innovation_m)
 
@@ -249,6 +262,12 @@ def rehearse(dimensions: int) -> None:
 
 def _since_s(then_ns: int | None, now_ns: int) -> float:
     return math.inf if then_ns is None else to_s(max(0, now_ns - then_ns))
+
+
+def _believable(covariance_m2: Array) -> Array:
+    """Covariance (2, 2) of a place as it can be used."""
+    used: Array = symmetric(covariance_m2) + _LEAST_SD_M**2 * np.eye(2)
+    return used
 
 
 def _ahead(covariance: Array, ahead_s: float, density_m2_s3: float) -> Array:
