@@ -19,6 +19,8 @@ from mine_loc_fusion.yaw_alignment import YawAlignment
 
 _LONGEST_CARRY_S = 1.0
 """A person walks on at the last step's speed until the next one is reported, no longer."""
+_LEAST_INTERVAL_S = 0.2
+"""Nobody steps faster: a shorter interval tells no speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +117,7 @@ class LosWeighted:
         if self._stamp_ns is None:
             self.begin(stamp_ns, fix.position_m, fix.covariance_m2, None)
             return Verdict(Source.UWB_POSE, 0, Reason.ACCEPTED)
-        los = 0.5 if math.isnan(fix.los_probability) else fix.los_probability
+        los = fix.los_probability if 0.0 <= fix.los_probability <= 1.0 else 0.5
         variance_m2 = los * self._s.los_sd_m**2 + (1.0 - los) * self._s.nlos_sd_m**2
         residual_m = fix.position_m - self._position_m
         distance_sq = float(residual_m @ residual_m) / (variance_m2 + self._variance_m2)
@@ -143,6 +145,6 @@ class LosWeighted:
         self._position_m = self._position_m + way_m - self._carried_m
         self._variance_m2 += (self._s.step_share * step.length_m) ** 2
         self._carried_m = np.zeros(2)
-        if step.interval_s > 0.0:
+        if step.interval_s > _LEAST_INTERVAL_S:
             self._velocity_ms = way_m / step.interval_s
         return Verdict(Source.STEP, 0, Reason.ACCEPTED)

@@ -80,7 +80,7 @@ def los_fraction(epoch: msg.Epoch) -> float:
     """Mean line-of-sight probability of the epoch's links; NaN = not judged."""
     judged = [state.los_probability for state in epoch.link_states]
     judged += [item.los_probability for array in epoch.ranges for item in array.ranges]
-    judged = [value for value in judged if not math.isnan(value)]
+    judged = [value for value in judged if 0.0 <= value <= 1.0]
     return float(np.mean(judged)) if judged else math.nan
 
 
