@@ -245,6 +245,7 @@ class Fusion(NodeBase):
         if not is_position(position_m, covariance_m2):
             return False, "pose: not a place with a covariance; allowed: finite, positive definite in x and y"
         tracked.begin(stamp_ns or self.now_ns(), position_m, covariance_m2, None)
+        self._publish([tracked], self.now_ns())
         return True, f"{request.person} is at {position_m[0]:.2f}, {position_m[1]:.2f}"
 
     def _toggle_sensor(self, request: ToggleSensor.Request) -> tuple[bool, str]:
