@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from walks import place_fix, ranges_to
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_core.verdicts import Reason, Source
 from mine_loc_fusion.ekf import Ekf
 from mine_loc_fusion.estimate import EpochInputs, PositionFix, StepFix
 from mine_loc_fusion.late_inputs import LateInputCorrector
+from mine_loc_fusion.tightly_coupled import TightlyCoupled
 
 T0 = 1_760_000_000 * NS_PER_S
 HISTORY_NS = 2 * NS_PER_S
@@ -90,3 +92,29 @@ def test_the_history_does_not_grow_for_ever():
     for epoch in walk(300):
         subject.update(epoch)
     assert len(subject._history) < 30
+
+
+def test_beyond_the_history_ranges_blinks_and_places_are_stale_under_their_own_names():
+    subject = LateInputCorrector(TightlyCoupled(), HISTORY_NS)
+    subject.update(EpochInputs(T0, ranges=(ranges_to((8.0, 6.0), T0),)))
+    before = subject.estimate(T0)
+    old_ns = T0 - HISTORY_NS - 1
+    ranges = ranges_to((9.0, 9.0), old_ns)
+    blink = replace(ranges, shared_offset=True)
+    places = (place_fix(9.0, 9.0), place_fix(9.0, 9.0, source=Source.REGION))
+    verdicts = subject.update(EpochInputs(old_ns, ranges=(ranges, blink), places=places))
+    assert {v.reason for v in verdicts} == {Reason.STALE}
+    assert [v.source for v in verdicts] == [Source.RANGE, Source.TDOA, Source.LANDMARK, Source.REGION]
+    assert_same(subject.estimate(T0), before)
+    on_time = subject.update(EpochInputs(T0 - HISTORY_NS, places=places[:1]))
+    assert Reason.STALE not in {v.reason for v in on_time}
+
+
+def test_who_begins_anew_has_no_history_to_go_back_to():
+    subject = corrector()
+    for epoch in walk(20):
+        subject.update(epoch)
+    subject.begin(T0 + NS_PER_S, np.array([70.0, 0.0]), 0.01 * np.eye(2), None)
+    subject.update(EpochInputs(T0 + NS_PER_S))
+    subject.update(EpochInputs(T0 + NS_PER_S // 2))  # late: goes back no farther than the new beginning
+    assert subject.estimate(T0 + NS_PER_S).position_m.tolist() == [70.0, 0.0]

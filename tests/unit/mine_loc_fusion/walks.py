@@ -56,7 +56,7 @@ def ranges_to(place_m, stamp_ns, *, noise_m=0.0, excess_m=0.0, anchors=HALL, spa
 
 @dataclass
 class Walk:
-    """Round and round a rectangle with round corners at 1.2 m/s, ranges ten times and steps twice a second, first step standing.
+    """Round and round a rectangle with round corners: ranges ten times and steps twice a second, the first from rest.
 
     The odom frame is turned by −yaw; steps are reported `step_scale` times as long as they are.
     """
@@ -65,6 +65,7 @@ class Walk:
     step_scale: float = 1.0
     seed: int = 0
     space: bool = False
+    radius_m: float = RADIUS_M
     range_sd_m: float = 0.05
     heading_sd_rad: float = 0.02
     number: int = 0
@@ -85,7 +86,7 @@ class Walk:
     def next(self, *, ranges=True, positions=False, steps=True, excess_m=0.0):
         """The epoch of the next tenth of a second."""
         self.number += 1
-        self.place_m = _on_rectangle(SPEED_M_S * self.at_s)
+        self.place_m = _on_rectangle(SPEED_M_S * self.at_s, radius_m=self.radius_m)
         taken, stamp_ns = (), self.stamp_ns
         if self.number % STEP_EVERY == 0:
             way_m = self.place_m - self.strike_m
@@ -96,7 +97,7 @@ class Walk:
             taken = (step_fix(length_m, heading_rad, math.nan if first else STEP_EVERY * PERIOD_S),)
         noise_m = self.rng.normal(0.0, self.range_sd_m, len(HALL))
         round_ = ranges_to(self.place_m, stamp_ns, noise_m=noise_m, excess_m=excess_m, space=self.space)
-        fix = position_fix(*(self.place_m + self.rng.normal(0.0, 0.1, 2)))
+        fix = position_fix(*(self.place_m + self.rng.normal(0.0, 0.1, 2)), los=1.0)
         return EpochInputs(
             stamp_ns,
             positions=(fix,) if positions else (),
@@ -117,7 +118,7 @@ class Walk:
         return math.inf if estimate is None else float(np.linalg.norm(estimate.position_m - self.place_m))
 
 
-def _on_rectangle(way_m, east_m=18.0, north_m=9.0, radius_m=RADIUS_M):
+def _on_rectangle(way_m, east_m=18.0, north_m=9.0, *, radius_m):
     """Where somebody is after so much of a way round a rectangle with round corners, from (5, 5) east."""
     sides_m, arc_m = (east_m, north_m, east_m, north_m), radius_m * math.pi / 2.0
     place_m, heading_rad, left_m = np.array([5.0, 5.0]), 0.0, way_m % (2.0 * (east_m + north_m) + 4.0 * arc_m)
