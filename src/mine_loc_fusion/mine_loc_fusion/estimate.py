@@ -121,9 +121,8 @@ def symmetric(covariance: Array) -> Array:
 
 def is_step(step: StepFix) -> bool:
     """Whether this is a step that a person can make, with variances."""
-    variances = step.length_variance_m2, step.heading_variance_rad2
     possible = 0.0 <= step.length_m < _LONGEST_STEP_M and isfinite(step.heading_rad)
-    return possible and all(0.0 <= variance < inf for variance in variances)
+    return possible and 0.0 <= step.length_variance_m2 < _LARGEST_SD_M**2 and 0.0 <= step.heading_variance_rad2 < inf
 
 
 def ce95_m(covariance_m2: Array) -> float:

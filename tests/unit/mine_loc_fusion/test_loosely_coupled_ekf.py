@@ -171,6 +171,7 @@ def test_an_impossible_position_is_refused_as_invalid(bad):
         {"length_m": 1e9},
         {"heading": math.inf},
         {"length_sd": math.nan},
+        {"length_sd": 2e8},
         {"heading_sd": math.inf},
     ],
 )
