@@ -256,7 +256,7 @@ def test_positions_that_are_refused_for_long_are_believed_in_the_end():
     assert taken[0] is Reason.GATE
     assert set(taken) == {Reason.GATE, Reason.ACCEPTED}
     first = taken.index(Reason.ACCEPTED)
-    assert first * 0.1 == pytest.approx(subject._s.tracker.reopen_after_s, abs=0.11)
+    assert first * 0.1 == pytest.approx(subject._s.alone.reopen_after_s, abs=0.11)
     assert set(taken[first:]) == {Reason.ACCEPTED}
     assert subject.estimate(stamp_ns).position_m == pytest.approx([60.0, 60.0], abs=0.2)
 
