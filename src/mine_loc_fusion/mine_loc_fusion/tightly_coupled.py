@@ -162,7 +162,7 @@ class TightlyCoupled:
             self._after_start(measurements.stamp_ns)
         self._ranges_ns = measurements.stamp_ns
         if self._tracker.started:
-            self._systematic_m2 = solution.fix.covariance_m2[:2, :2] - self._tracker.P[:2, :2]
+            self._systematic_m2 = _covariance_or_none(solution.fix.covariance_m2[:2, :2] - self._tracker.P[:2, :2])
         if Reason.ACCEPTED in solution.reasons:
             self._uwb_ns = measurements.stamp_ns
         source, gate = Source.TDOA if measurements.shared_offset else Source.RANGE, solution.gate
@@ -262,6 +262,12 @@ def rehearse(dimensions: int) -> None:
 
 def _since_s(then_ns: int | None, now_ns: int) -> float:
     return math.inf if then_ns is None else to_s(max(0, now_ns - then_ns))
+
+
+def _covariance_or_none(difference_m2: Array) -> Array:
+    """The difference (2, 2) of two covariances, nothing where it is none: a tracker in doubt widens the diagonal."""
+    (a, b), (_, c) = difference_m2.tolist()
+    return difference_m2 if a >= 0.0 and c >= 0.0 and a * c >= (1.0 - 1e-9) * b * b else np.zeros((2, 2))
 
 
 def _believable(covariance_m2: Array) -> Array:
