@@ -37,6 +37,18 @@ def remember_strike(x: Array, P: Array, first_link: int) -> None:
 
 
 @njit(cache=True)
+def allow_turn(P: Array, dimensions: int, turning_s: float, density_m2_s3: float) -> None:
+    """Add to P what a horizontal white acceleration of this density would have, had it acted for this time."""
+    q = density_m2_s3 * turning_s
+    for p in range(2):
+        v = dimensions + p
+        P[p, p] += q * turning_s * turning_s / 3.0
+        P[p, v] += q * turning_s / 2.0
+        P[v, p] += q * turning_s / 2.0
+        P[v, v] += q
+
+
+@njit(cache=True)
 def take_step(
     x: Array,
     P: Array,

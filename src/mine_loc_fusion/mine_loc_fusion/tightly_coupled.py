@@ -234,12 +234,14 @@ class TightlyCoupled:
         return verdict
 
     def _measure_way(self, step: StepFix) -> Verdict:
+        """A step that steady walking does not explain is tried again as one round a corner."""
         tracker, s = self._tracker, self._s
         along_m2 = (s.step_along_sd * step.length_m) ** 2 + _STRIKE_SD_M**2
-        d2 = step_kernel.take_step(
-            tracker.x, tracker.P, tracker.first_link, step.length_m, step.heading_rad, along_m2,
-            s.step_across_sd_m**2, self._gate,
-        )  # fmt: skip
+        way = step.length_m, step.heading_rad, along_m2, s.step_across_sd_m**2, self._gate
+        d2 = step_kernel.take_step(tracker.x, tracker.P, tracker.first_link, *way)
+        if d2 > self._gate:
+            step_kernel.allow_turn(tracker.P, tracker.dimensions, step.interval_s, s.turn_density_m2_s3)
+            d2 = step_kernel.take_step(tracker.x, tracker.P, tracker.first_link, *way)
         reason = Reason.ACCEPTED if d2 <= self._gate else Reason.GATE
         return Verdict(Source.STEP, 0, reason, d2, self._gate, 2)
 

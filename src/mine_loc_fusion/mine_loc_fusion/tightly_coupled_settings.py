@@ -35,6 +35,8 @@ class TightlyCoupledSettings:
     step_along_sd: float = 0.07
     """Of a step's length, relative to it, beyond what all steps of the person share."""
     step_across_sd_m: float = 0.04
+    turn_density_m2_s3: float = 4.0
+    """Of white acceleration within a step round a corner: a right angle at walking speed."""
     scale_sd: float = 0.05
     """Of the step length's error that all steps share, at the start."""
     scale_walk_sd: float = 0.002

@@ -164,7 +164,6 @@ def test_a_minute_on_steps_costs_less_than_two_percent_of_the_way_and_ends_withi
     assert walk.play(subject, 2.0)[2:].max() < 0.3
 
 
-@pytest.mark.xfail(strict=True, reason="steps round a sharp corner are refused: white acceleration cannot explain them")
 def test_a_sharp_corner_on_steps_alone_loses_no_step():
     subject, walk = walked(60.0, radius_m=0.3)
     verdicts = [verdict for _ in range(600) for verdict in subject.update(walk.next(ranges=False))]
