@@ -10,6 +10,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,9 @@ PARTS: Mapping[str, Callable[[], Any]] = {
     "paper_a": fusion_paper_a.run,
     "isas_walk1": fusion_isas.run,
     "blackout": fusion_blackout.run,
-    "proximity": fusion_proximity.run,
+    "proximity": fusion_proximity.proximity_rows,
+    "proximity_obstacles": partial(fusion_proximity.proximity_rows, "loading_place", "obstacles"),
+    "proximity_anchors_on_vehicle": partial(fusion_proximity.proximity_rows, "vehicle", "spikes"),
 }
 
 
