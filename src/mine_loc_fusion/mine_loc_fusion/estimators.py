@@ -1,6 +1,7 @@
 """The estimators by name, as the parameter `method` of the fusion node chooses them."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.adaptive_ekf import AdaptiveEkf
@@ -9,6 +10,7 @@ from mine_loc_fusion.estimate import Estimator
 from mine_loc_fusion.los_weighted import LosWeighted, LosWeightedSettings
 from mine_loc_fusion.robust_kf import RobustKf
 from mine_loc_fusion.tightly_coupled import TightlyCoupled
+from mine_loc_fusion.tightly_coupled_settings import TightlyCoupledSettings
 
 RIVALS: Mapping[str, Callable[[], Estimator]] = {
     "los_weighted": LosWeighted,
@@ -19,6 +21,14 @@ RIVALS: Mapping[str, Callable[[], Estimator]] = {
 }
 
 
-def make_estimator(method: str, height_m: float | None, area: WalkableArea | None) -> Estimator:
-    """A new estimator of one person; `height_m` and `area` as in TightlyCoupled."""
-    return TightlyCoupled(height_m=height_m, area=area) if method == "mine_loc" else RIVALS[method]()
+def make_estimator(method: str, systematic_sd_m: float, height_m: float | None, area: WalkableArea | None) -> Estimator:
+    """A new estimator of one person; `height_m` and `area` as in TightlyCoupled.
+
+    `systematic_sd_m` is what stays of a link's error where radios are not calibrated, and is added to what is claimed.
+    """
+    if method != "mine_loc":
+        return RIVALS[method]()
+    given = TightlyCoupledSettings()
+    stepping = replace(given.stepping, systematic_sd_m=systematic_sd_m)
+    alone = replace(given.alone, systematic_sd_m=systematic_sd_m)
+    return TightlyCoupled(replace(given, stepping=stepping, alone=alone), height_m, area)

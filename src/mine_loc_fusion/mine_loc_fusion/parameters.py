@@ -33,6 +33,9 @@ class FusionParameters(NodeParameters):
     range_correction: str = parameter(
         "", "file of `mine-loc fit-ranges`; a relative path starts at the site's folder; empty = none", read_only=True
     )
+    systematic_sd: float = parameter(
+        0.2, "error of a link's ranges that stays; less where radios are calibrated", unit="m", low=0.0, high=5.0
+    )
     max_range_m: float = parameter(300.0, "longer ranges are impossible", unit="m", low=1.0, high=1000.0)
     arrival_sd_m: float = parameter(0.15, "standard deviation of a blink's arrivals", unit="m", low=0.001, high=10.0)
     uwb_timeout_s: float = parameter(

@@ -161,7 +161,7 @@ class TightlyCoupled:
         if self._tracker.starts != self._starts:
             self._after_start(measurements.stamp_ns)
         self._ranges_ns = measurements.stamp_ns
-        if self._tracker.started:
+        if self._tracker.started and Reason.ACCEPTED in solution.reasons:  # else what held before still does
             self._systematic_m2 = _covariance_or_none(solution.fix.covariance_m2[:2, :2] - self._tracker.P[:2, :2])
         if Reason.ACCEPTED in solution.reasons:
             self._uwb_ns = measurements.stamp_ns

@@ -48,7 +48,8 @@ class TrackedPerson:
 
     def reset(self) -> None:
         """Forget the estimate; statistics stay. Output stamps may start anew: time itself jumped, or a person asked."""
-        estimator = make_estimator(self._parameters.method, self._height_m, self._area)
+        p = self._parameters
+        estimator = make_estimator(p.method, p.systematic_sd, self._height_m, self._area)
         self._corrector = LateInputCorrector(estimator, to_ns(self._parameters.history_s))
         self.published_ns: int | None = None
 

@@ -21,15 +21,15 @@ SEEDS = st.integers(0, 2**32 - 1)
 def test_every_method_has_an_estimator_and_every_estimator_a_method():
     assert set(METHODS) == {"mine_loc", *RIVALS}
     assert METHODS[0] == "mine_loc"
-    assert isinstance(make_estimator("mine_loc", None, None), TightlyCoupled)
-    made = make_estimator("los_weighted_residual", None, None)
+    assert isinstance(make_estimator("mine_loc", 0.2, None, None), TightlyCoupled)
+    made = make_estimator("los_weighted_residual", 0.2, None, None)
     assert isinstance(made, LosWeighted)
-    assert (made._s.residual_gate, make_estimator("los_weighted", None, None)._s.residual_gate) == (3.0, None)
+    assert (made._s.residual_gate, make_estimator("los_weighted", 0.2, None, None)._s.residual_gate) == (3.0, None)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_each_call_makes_a_new_one(method):
-    one, other = make_estimator(method, None, None), make_estimator(method, None, None)
+    one, other = make_estimator(method, 0.2, None, None), make_estimator(method, 0.2, None, None)
     one.update(EpochInputs(T0, positions=(position_fix(1.0, 2.0),)))
     assert one.estimate(T0) is not None
     assert other.estimate(T0) is None
@@ -37,7 +37,7 @@ def test_each_call_makes_a_new_one(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_all_follow_a_walk_by_positions_and_steps(method):
-    subject, walk = make_estimator(method, None, None), Walk()
+    subject, walk = make_estimator(method, 0.2, None, None), Walk()
     subject.begin(walk.stamp_ns, walk.place_m, 0.01 * np.eye(2), (walk.yaw_rad, 0.01))
     errors = walk.play(subject, 40.0, ranges=False, positions=True)
     assert errors[100:].mean() < 0.5
@@ -48,7 +48,7 @@ def test_all_follow_a_walk_by_positions_and_steps(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_all_begin_where_they_are_told_and_have_the_yaw(method):
-    subject = make_estimator(method, None, None)
+    subject = make_estimator(method, 0.2, None, None)
     subject.begin(T0, np.array([3.0, 4.0]), np.array([[0.5, 0.3], [0.1, 0.5]]), (0.4, 0.01))
     estimate = subject.estimate(T0)
     assert estimate.position_m.tolist() == [3.0, 4.0]
@@ -58,7 +58,7 @@ def test_all_begin_where_they_are_told_and_have_the_yaw(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_asking_changes_nothing(method):
-    asked, alone, walk = make_estimator(method, None, None), make_estimator(method, None, None), Walk()
+    asked, alone, walk = make_estimator(method, 0.2, None, None), make_estimator(method, 0.2, None, None), Walk()
     for _ in range(200):
         epoch = walk.next(positions=True)
         alone.update(epoch)
@@ -71,7 +71,7 @@ def test_asking_changes_nothing(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_restored_goes_on_to_the_same_estimate(method):
-    subject, walk = make_estimator(method, None, None), Walk()
+    subject, walk = make_estimator(method, 0.2, None, None), Walk()
     walk.play(subject, 3.0, positions=True, ranges=False)
     saved, epochs, ends = subject.save(), [walk.next(positions=True, ranges=False) for _ in range(100)], []
     for _ in range(3):
@@ -89,7 +89,7 @@ def test_what_is_restored_goes_on_to_the_same_estimate(method):
 @settings(max_examples=60, deadline=None)
 @given(seed=SEEDS, known=st.booleans())
 def test_all_survive_whatever_they_are_told(method, seed, known):
-    subject, walk = make_estimator(method, None, None), Walk()
+    subject, walk = make_estimator(method, 0.2, None, None), Walk()
     walk.play(subject, 10.0 if known else 0.0, positions=True, ranges=False)
     garbage = Garbage(seed, start_ns=walk.stamp_ns)
     for _ in range(30):
@@ -107,7 +107,19 @@ def test_all_survive_whatever_they_are_told(method, seed, known):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_without_inputs_nobody_becomes_surer(method):
-    subject, walk = make_estimator(method, None, None), Walk()
+    subject, walk = make_estimator(method, 0.2, None, None), Walk()
     walk.play(subject, 20.0, positions=True, ranges=False)
     spreads = [np.trace(subject.estimate(at(20.0 + s)).covariance[:2, :2]) for s in range(0, 600, 10)]
     assert (np.diff(spreads) > 0.0).all()
+
+
+def test_what_stays_of_a_links_error_widens_the_claim_and_moves_nothing():
+    calibrated, uncalibrated = make_estimator("mine_loc", 0.0, None, None), make_estimator("mine_loc", 0.2, None, None)
+    walks = Walk(), Walk()
+    for _ in range(300):
+        calibrated.update(walks[0].next())
+        uncalibrated.update(walks[1].next())
+    sure, unsure = calibrated.estimate(walks[0].stamp_ns), uncalibrated.estimate(walks[1].stamp_ns)
+    assert unsure.position_m == pytest.approx(sure.position_m)
+    widened = np.linalg.eigvalsh(unsure.covariance[:2, :2] - sure.covariance[:2, :2])
+    assert 0.1**2 < widened[0] <= widened[1] < 0.5**2
