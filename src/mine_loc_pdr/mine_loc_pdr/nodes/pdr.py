@@ -76,10 +76,9 @@ class Track:
         self.mounting_yaw_rad: float | None = None  # as last published
         self.samples = 0
 
-    def recognise(self, sample: ImuSample) -> Activity | None:
-        """The activity of the window that ends with a sample which dead reckoning has taken."""
-        heading_rad = self.pdr.heading_rad
-        return None if heading_rad is None else self._recogniser.push(sample.stamp_ns, heading_rad, sample.force_m_s2)
+    def recognise(self, sample: ImuSample, heading_rad: float) -> Activity | None:
+        """The activity of the window that ends with a sample, and the waist's heading after it."""
+        return self._recogniser.push(sample.stamp_ns, heading_rad, sample.force_m_s2)
 
 
 class Pdr(NodeBase):
@@ -156,9 +155,8 @@ class Pdr(NodeBase):
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
             self._refine_stride(track, step)
-        if (activity := track.recognise(sample)) is not None:
-            self._activities.publish(_activity(track.person.name, activity))
-        self._follow_plane(track, sample.stamp_ns, step)
+        if (heading_rad := track.pdr.heading_rad) is not None:
+            self._follow_heading(track, sample, heading_rad, step)
         period = sample.stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
@@ -183,10 +181,10 @@ class Pdr(NodeBase):
         track.pdr.push_field(field_sample(message))
         track.field_heard_s = time.monotonic()
 
-    def _follow_plane(self, track: Track, stamp_ns: int, step: StepEvent | None) -> None:
-        if (heading_rad := track.pdr.heading_rad) is None:
-            return
-        if (fix := track.plane.push(stamp_ns, heading_rad, step)) is not None:
+    def _follow_heading(self, track: Track, sample: ImuSample, heading_rad: float, step: StepEvent | None) -> None:
+        if (activity := track.recognise(sample, heading_rad)) is not None:
+            self._activities.publish(_activity(track.person.name, activity))
+        if (fix := track.plane.push(sample.stamp_ns, heading_rad, step)) is not None:
             self._landmark_fixes.publish(to_landmark_fix(fix, track.person.name, self._site.map_frame))
 
     def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
