@@ -56,6 +56,8 @@ class RobustTracker:
         self.x, self.P = np.empty(0), np.empty((0, 0))
         self.starts = 0
         """How often the track has begun anew."""
+        self.dimensions = self.first_link = 0
+        """How many coordinates a place has, and where the biases of links begin in the state."""
         self.motion_known = False
         """Whether the caller knows how the person moves: doubt about ranges then casts none on the place."""
         self._stamp_ns = self._round_ns = self._trusted_ns = 0
@@ -83,16 +85,6 @@ class RobustTracker:
     def started(self) -> bool:
         """Whether there is a place."""
         return self.starts > 0
-
-    @property
-    def first_link(self) -> int:
-        """Where the biases of links begin in the state."""
-        return len(self.x) - len(self._link_nlos)
-
-    @property
-    def dimensions(self) -> int:
-        """How many coordinates a place has."""
-        return (self.first_link - self._own_states - 1) // 2
 
     def advance(self, stamp_ns: int) -> None:
         """Predict the state to an instant; to an earlier one than that of the state nothing changes."""
@@ -257,14 +249,15 @@ class RobustTracker:
     def place(self, stamp_ns: int, position_m: Array, covariance_m2: Array) -> None:
         """Begin at a place (d,), at rest, with nothing known of the links; the caller's states stay."""
         d, own = len(position_m), self._own_states
+        before = slice(self.first_link - own, self.first_link)
         x, P = np.zeros(2 * d + 1 + own), np.zeros((2 * d + 1 + own, 2 * d + 1 + own))
         if self.started and own:
-            last = slice(self.first_link - own, self.first_link)
-            x[-own:], P[-own:, -own:] = self.x[last], self.P[last, last]
+            x[-own:], P[-own:, -own:] = self.x[before], self.P[before, before]
         x[:d], P[:d, :d] = position_m, covariance_m2
         P[range(d, 2 * d), range(d, 2 * d)] = self._settings.first_speed_sd_m_s**2
         P[2 * d, 2 * d] = self._settings.common_bias_sd_m**2
         self.x, self.P = x, P
+        self.dimensions, self.first_link = d, len(x)
         self._slot, self._known, self._link_nlos = {}, (b"", np.empty(0, np.int64)), np.empty(0)
         self._stamp_ns = self._round_ns = self._trusted_ns = stamp_ns
         self._doubt_s = 0.0
