@@ -184,6 +184,12 @@ class Site:
     relays: tuple[Relay, ...] = ()
     discovery: Discovery = Discovery()
 
+    @property
+    def fixed_anchors(self) -> tuple[Anchor, ...]:
+        """The anchors that no vehicle carries: those placed in the map."""
+        carried = {anchor for vehicle in self.vehicles for anchor in vehicle.anchor_ids}
+        return tuple(anchor for anchor in self.anchors if anchor.id not in carried)
+
 
 def load_site(folder: Path) -> Site:
     """Read and check `site.yaml` in `folder`.

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from mine_loc_core.polygon import is_inside, nearest_on_border
 from mine_loc_core.site import Chamber, Gallery, Site
 
 Array = npt.NDArray[np.float64]
@@ -76,17 +77,7 @@ def _nearest_in_legs(legs: Array, points_m: Array) -> Array:
 
 
 def _nearest_in(polygon: Array, points_m: Array) -> Array:
-    """(n, 2); inside by the even-odd rule."""
-    start, edge = polygon, np.roll(polygon, -1, axis=0) - polygon
-    offset = points_m[:, None] - start
-    share = np.clip(np.sum(offset * edge, axis=2) / np.maximum(np.sum(edge**2, axis=1), 1e-300), 0.0, 1.0)
-    feet = start + share[..., None] * edge
-    best = np.argmin(np.sum((feet - points_m[:, None]) ** 2, axis=2), axis=1)
-    x, y = points_m[:, :1], points_m[:, 1:]
-    (x0, y0), (x1, y1) = start.T, np.roll(polygon, -1, axis=0).T
-    straddles = (y0 > y) != (y1 > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        left = x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
-    inside = np.sum(straddles & left, axis=1) % 2 == 1
-    nearest: Array = np.where(inside[:, None], points_m, feet[np.arange(len(points_m)), best])
+    """(n, 2)."""
+    inside = is_inside(polygon, points_m)[:, None]
+    nearest: Array = np.where(inside, points_m, nearest_on_border(polygon, points_m))
     return nearest

@@ -1,5 +1,6 @@
 """What every estimator takes and answers."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import hypot, inf, isfinite, nan, sqrt
 from typing import Any, Protocol
@@ -61,6 +62,15 @@ class EpochInputs:
     steps: tuple[StepFix, ...] = ()
     ranges: tuple[Measurements, ...] = ()
     places: tuple[PlaceFix, ...] = ()
+
+
+SOURCE_OF: Mapping[str, Callable[[Any], Source]] = {
+    "positions": lambda _: Source.UWB_POSE,
+    "steps": lambda _: Source.STEP,
+    "ranges": lambda measurements: Source.TDOA if measurements.shared_offset else Source.RANGE,
+    "places": lambda place: place.source,
+}
+"""The kind of each of an epoch's measurements, by the field that holds it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,8 @@
 from collections import deque
 from typing import Any
 
-from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, Estimator
+from mine_loc_core.verdicts import Reason, Verdict
+from mine_loc_fusion.estimate import SOURCE_OF, Array, EpochInputs, Estimate, Estimator
 
 
 class LateInputCorrector:
@@ -50,7 +50,5 @@ class LateInputCorrector:
 
 
 def _stale(inputs: EpochInputs) -> tuple[Verdict, ...]:
-    sources = [Source.UWB_POSE for _ in inputs.positions] + [Source.STEP for _ in inputs.steps]
-    sources += [Source.TDOA if each.shared_offset else Source.RANGE for each in inputs.ranges]
-    sources += [place.source for place in inputs.places]
+    sources = [source_of(item) for name, source_of in SOURCE_OF.items() for item in getattr(inputs, name)]
     return tuple(Verdict(source, 0, Reason.STALE) for source in sources)

@@ -47,17 +47,15 @@ class Drawing:
 
 def draw_site(site: Site, zones: tuple[ProximityZone, ...]) -> Iterator[Drawing]:
     """Everything that does not move: galleries, chambers, obstacles, anchors of the place, zones of the map."""
-    carried = {anchor for vehicle in site.vehicles for anchor in vehicle.anchor_ids}
     for gallery in site.galleries:
         yield _gallery(gallery)
     for group, parts, colour in (("chambers", site.chambers, ROCK), ("obstacles", site.obstacles, GREY)):
         for part in parts:
             yield _ring(group, part.id, np.array(part.polygon_m), colour, part.floor_m)
-    for anchor in site.anchors:
-        if anchor.id not in carried:
-            size_m = (_ANCHOR_M, _ANCHOR_M, _ANCHOR_M)
-            yield Drawing("anchors", str(anchor.id), "box", BLUE, anchor.position_m, size_m=size_m)
-            yield _label("anchor names", str(anchor.id), anchor.position_m, anchor.name)
+    for anchor in site.fixed_anchors:
+        size_m = (_ANCHOR_M, _ANCHOR_M, _ANCHOR_M)
+        yield Drawing("anchors", str(anchor.id), "box", BLUE, anchor.position_m, size_m=size_m)
+        yield _label("anchor names", str(anchor.id), anchor.position_m, anchor.name)
     for zone in site.zones:
         if zone.vehicle is None:
             yield _ring("zones", zone.id, np.array(zone.polygon_m), WHITE)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import to_ns, to_s
+from mine_loc_fusion.estimate import ce95_m
 from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.zone_shape import Array, ZoneShape
 
@@ -32,9 +32,7 @@ class SeenPerson:
     @property
     def ce95_m(self) -> float:
         """Radius round the mean that holds the person with probability 0.95 at least; inf where nothing is known."""
-        if not self.stated:
-            return math.inf
-        return math.sqrt(max(float(np.linalg.eigvalsh(self.covariance_m2)[-1]), 0.0) * chi2_quantile(0.95, 2))
+        return ce95_m(self.covariance_m2) if self.stated else math.inf
 
 
 @dataclass(frozen=True, slots=True)

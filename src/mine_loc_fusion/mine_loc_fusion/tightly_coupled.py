@@ -17,6 +17,7 @@ from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion import step_kernel
 from mine_loc_fusion.estimate import (
+    SOURCE_OF,
     Array,
     EpochInputs,
     Estimate,
@@ -116,9 +117,8 @@ class TightlyCoupled:
         if self._area is not None:
             position, velocity, covariance = between_walls(position, velocity, covariance, self._area)
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
-        since = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
+        uwb_s, step_s, region_s = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
         height_m = None if d == 2 else float(tracker.x[2])
-        uwb_s, step_s, region_s = since
         return Estimate(stamp_ns, position, velocity, covariance, yaw, uwb_s, step_s, region_s, height_m)
 
     def save(self) -> Any:
@@ -161,11 +161,10 @@ class TightlyCoupled:
         if self._tracker.starts != self._starts:
             self._after_start(measurements.stamp_ns)
         self._ranges_ns = measurements.stamp_ns
-        if self._tracker.started and Reason.ACCEPTED in solution.reasons:  # else what held before still does
+        if Reason.ACCEPTED in solution.reasons:  # else what held before still does
             self._systematic_m2 = _covariance_or_none(solution.fix.covariance_m2[:2, :2] - self._tracker.P[:2, :2])
-        if Reason.ACCEPTED in solution.reasons:
             self._uwb_ns = measurements.stamp_ns
-        source, gate = Source.TDOA if measurements.shared_offset else Source.RANGE, solution.gate
+        source, gate = SOURCE_OF["ranges"](measurements), solution.gate
         rows = zip(measurements.anchor_ids.tolist(), solution.reasons, solution.mahalanobis_sq.tolist(), strict=True)
         return [Verdict(source, anchor, reason, d2, gate, 1) for anchor, reason, d2 in rows]
 

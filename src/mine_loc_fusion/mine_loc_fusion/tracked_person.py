@@ -1,7 +1,6 @@
 """One person under fusion: the estimator with late inputs, and the rule that output stamps never go back."""
 
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import nan
 from typing import Any
@@ -12,7 +11,7 @@ from mine_loc_core.people import Person
 from mine_loc_core.stamps import to_ns
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_core.walkable_area import WalkableArea
-from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PlaceFix
+from mine_loc_fusion.estimate import SOURCE_OF, Array, EpochInputs, Estimate, PlaceFix
 from mine_loc_fusion.estimators import make_estimator
 from mine_loc_fusion.late_inputs import LateInputCorrector
 from mine_loc_fusion.mode import Mode, ModeLimits, mode_of
@@ -109,16 +108,8 @@ def _without(inputs: EpochInputs, disabled: set[Source]) -> tuple[EpochInputs, t
         return inputs, ()
     kept: dict[str, Any] = {}
     refused: list[Verdict] = []
-    for name, source_of in _SOURCE_OF.items():
+    for name, source_of in SOURCE_OF.items():
         items = getattr(inputs, name)
         kept[name] = tuple(item for item in items if source_of(item) not in disabled)
         refused += [Verdict(source_of(item), 0, Reason.DISABLED) for item in items if source_of(item) in disabled]
     return replace(inputs, **kept), tuple(refused)
-
-
-_SOURCE_OF: Mapping[str, Callable[[Any], Source]] = {
-    "positions": lambda _: Source.UWB_POSE,
-    "steps": lambda _: Source.STEP,
-    "ranges": lambda measurements: Source.TDOA if measurements.shared_offset else Source.RANGE,
-    "places": lambda place: place.source,
-}

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from mine_loc_core.polygon import is_inside, nearest_on_border
+
 Array = npt.NDArray[np.float64]
 
 
@@ -21,7 +23,9 @@ class ZoneShape:
 
     def signed_distance_m(self, points_m: Array) -> Array:
         """Distance of points (n, 2) from the zone's border [m], negative inside, (n,)."""
-        return _from_polygon_m(self.polygon_m, points_m) - self.margin_m
+        distance_m = np.linalg.norm(points_m - nearest_on_border(self.polygon_m, points_m), axis=1)
+        signed: Array = np.where(is_inside(self.polygon_m, points_m), -distance_m, distance_m) - self.margin_m
+        return signed
 
     def placed(self, x_m: float, y_m: float, yaw_rad: float) -> "ZoneShape":
         """The zone of a body that stands at (x, y) [m] with `yaw_rad` (counter-clockwise) in the frame wanted."""
@@ -39,20 +43,3 @@ def outline(length_m: float, width_m: float) -> Array:
     return 0.5 * np.array(
         [[length_m, width_m], [-length_m, width_m], [-length_m, -width_m], [length_m, -width_m]], dtype=float
     )
-
-
-def _from_polygon_m(polygon_m: Array, points_m: Array) -> Array:
-    """Signed distance (n,) from the polygon's border; inside by the even-odd rule."""
-    start, end = polygon_m, np.roll(polygon_m, -1, axis=0)
-    edge = end - start
-    offset = points_m[:, None] - start
-    length_sq = np.maximum(np.sum(edge**2, axis=1), 1e-300)
-    share = np.clip(np.sum(offset * edge, axis=2) / length_sq, 0.0, 1.0)
-    distance_m = np.sqrt(np.min(np.sum((offset - share[..., None] * edge) ** 2, axis=2), axis=1))
-    x, y = points_m[:, :1], points_m[:, 1:]
-    rise = end[:, 1] > start[:, 1]
-    straddles = (start[:, 1] > y) != (end[:, 1] > y)
-    left = ((x - start[:, 0]) * edge[:, 1] < (y - start[:, 1]) * edge[:, 0]) == rise
-    inside = np.sum(straddles & left, axis=1) % 2 == 1
-    signed: Array = np.where(inside, -distance_m, distance_m)
-    return signed

@@ -180,8 +180,7 @@ class RouteNetwork:
 
 def _box(site: Site) -> Array | None:
     """Ground about the fixed anchors, or the monitors where there are none, as lowest and highest x, y."""
-    carried = {anchor for vehicle in site.vehicles for anchor in vehicle.anchor_ids}
-    places = [anchor.position_m[:2] for anchor in site.anchors if anchor.id not in carried]
+    places = [anchor.position_m[:2] for anchor in site.fixed_anchors]
     places += [vehicle.position_m[:2] for vehicle in site.vehicles if vehicle.anchor_ids]
     places = places or [monitor.position_m[:2] for monitor in site.monitors]
     if not places:

@@ -20,8 +20,7 @@ def anchor_frame(site: Site, wanted: str) -> AnchorFrame:
     A vehicle's frame is `<id>/base_link` (REP 105). Raises ConfigurationError for a name the site does not have.
     """
     vehicles = {vehicle.id: frozenset(vehicle.anchor_ids) for vehicle in site.vehicles if vehicle.anchor_ids}
-    carried = frozenset[int]().union(*vehicles.values())
-    fixed = tuple(anchor for anchor in site.anchors if anchor.id not in carried)
+    fixed = site.fixed_anchors
     if not wanted and not fixed and len(vehicles) == 1:
         wanted = next(iter(vehicles))
     if wanted in vehicles:

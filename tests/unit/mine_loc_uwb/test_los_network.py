@@ -225,6 +225,6 @@ def test_without_a_model_the_power_rule_judges_and_says_so():
 
 def test_cuda_where_there_is_none_is_refused():
     if torch.cuda.is_available():
-        pytest.skip("there is one")
+        pytest.skip("a CUDA device is there: nothing to refuse")
     with pytest.raises(ConfigurationError, match="cuda is not available here; allowed: cpu"):
         load_classifier(shipped_model(), "cuda")

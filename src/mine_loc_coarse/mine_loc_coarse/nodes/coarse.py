@@ -40,8 +40,7 @@ class Coarse(NodeBase):
             raise ConfigurationError(f"{self._site.name}: monitors: none; allowed: at least one")
         self._people = PeopleFile(Path(self.parameters.site))
         self._positioning = CoarsePositioning(self._site.monitors, self.parameters.settings(), self._site.galleries)
-        carried = {anchor for vehicle in self._site.vehicles for anchor in vehicle.anchor_ids}
-        self._anchors = [anchor for anchor in self._site.anchors if anchor.id not in carried]
+        self._anchors = self._site.fixed_anchors
         self._regions = self.publish_to(CoarseRegionArray, "coarse/regions", EVENTS)
         self._wake = self.publish_to(WakeAnchors, "coarse/wake", EVENTS)
         self.subscribe(BearingArray, "coarse/bearings", self._on_bearings, EVENTS)

@@ -35,7 +35,6 @@ from mine_loc_fusion.nodes.messages import (
 from mine_loc_fusion.parameters import FusionParameters
 from mine_loc_fusion.tightly_coupled import rehearse
 from mine_loc_fusion.tracked_person import TrackedPerson
-from mine_loc_uwb.anchor_frame import anchor_frame
 from mine_loc_uwb.range_correction_file import load_range_correction
 from mine_loc_uwb.range_intake import RangeIntake
 
@@ -60,9 +59,8 @@ class Fusion(NodeBase):
         self._served = {name.strip() for name in self.parameters.people.split(",") if name.strip()}
         chosen = self.parameters.range_correction
         correction = load_range_correction(folder / chosen) if chosen else None
-        anchors = anchor_frame(self._site, self._site.map_frame).anchors
         self._area = WalkableArea.of(self._site)
-        self._intake = RangeIntake(anchors, self.parameters.max_range_m, correction)
+        self._intake = RangeIntake(self._site.fixed_anchors, self.parameters.max_range_m, correction)
         self._tracked: dict[str, TrackedPerson] = {}
         self._pose_publishers: dict[str, object] = {}
         self._array = self.publish_to(msg.PersonPoseArray, "fused/poses", EVENTS)

@@ -170,7 +170,8 @@ class Pdr(NodeBase):
             self._strides.publish(_stride_update(track.person, step.stamp_ns, found))
 
     def _on_uwb_pose(self, message: UwbPose) -> None:
-        track = next((t for t in self._tracks.values() if t.person.tag_id == message.tag_id), None)
+        person = self._file.people.by_tag(message.tag_id)
+        track = None if person is None else self._tracks.get(person.name)
         if track is None or message.status != UwbPose.OK or "/" in message.header.frame_id:  # of a vehicle's own frame
             return
         place, covariance = message.pose.pose.position, message.pose.covariance
