@@ -14,8 +14,9 @@ from mine_loc_coarse.waking import anchors_to_wake
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 
@@ -26,10 +27,8 @@ _PEOPLE_PERIOD_S = 1.0
 class Coarse(NodeBase):
     """Publishes coarse/regions and coarse/wake every period, whether reports come or not."""
 
+    default_name = "coarse"
     parameter_class = CoarseParameters
-
-    def __init__(self) -> None:
-        super().__init__("coarse")
 
     def configure(self) -> None:
         """Read the site; one without monitors refuses the transition."""

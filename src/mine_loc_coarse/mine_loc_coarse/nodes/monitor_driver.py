@@ -2,6 +2,7 @@
 
 import math
 import sys
+import threading
 import time
 from collections import OrderedDict
 from collections.abc import Iterable
@@ -16,9 +17,10 @@ from mine_loc_coarse.parameters import MonitorDriverParameters
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import Host, NodeBase
 from mine_loc_core.nodes.qos import EVENTS
-from mine_loc_core.serial_link import SerialLink
+from mine_loc_core.nodes.ros_host import run
+from mine_loc_core.serial_link import Chunk, SerialLink
 
 _MOST_MONITORS = 256
 _MOST_BEARINGS = 4096
@@ -28,17 +30,17 @@ _LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 class MonitorDriver(NodeBase):
     """Reads one port for ever and publishes coarse/bearings, stamped with the instants of measurement."""
 
+    default_name = "monitor_driver"
     parameter_class = MonitorDriverParameters
-    needs_guard_condition = True
 
-    def __init__(self) -> None:
-        super().__init__("monitor_driver")
-        self._arrived = self.create_guard_condition(self.guarded(self._read, "serial data"))
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._decoding = threading.Lock()  # the reader's thread decodes and publishes; the executor does the rest
 
     def configure(self) -> None:
         """Create the publisher; nothing is opened yet."""
         if not self.parameters.port:
-            raise ConfigurationError(f"{self.get_name()}: port: empty; allowed: any but an empty text")
+            raise ConfigurationError(f"{self.name}: port: empty; allowed: any but an empty text")
         self._bearings = self.publish_to(BearingArray, "coarse/bearings", EVENTS)
 
     def activate(self) -> None:
@@ -48,7 +50,8 @@ class MonitorDriver(NodeBase):
         self._clocks: OrderedDict[int, MonitorClock] = OrderedDict()
         self._reports = self._losses_before = self._impossible_stamps = 0
         self._last_report_s = time.monotonic()
-        self._link = SerialLink(p.port, p.baud, clock=self.now_ns, wake=self._arrived.trigger, silence_s=p.silence_s)
+        read = self.guarded(self._read, "serial data")
+        self._link = SerialLink(p.port, p.baud, clock=self.now_ns, wake=read, silence_s=p.silence_s)
         self._link.start()
 
     def deactivate(self) -> None:
@@ -57,11 +60,13 @@ class MonitorDriver(NodeBase):
 
     def parameters_changed(self) -> None:
         """Trust in the monitors' clocks takes effect at once."""
-        self._clocks.clear()
+        with self._decoding:
+            self._clocks.clear()
 
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Offsets learnt against the old time are void."""
-        self._clocks.clear()
+        with self._decoding:
+            self._clocks.clear()
 
     def health(self) -> Iterable[Health]:
         """The line, and what is decoded from it."""
@@ -82,14 +87,18 @@ class MonitorDriver(NodeBase):
         yield Health("decoder", level, "mldf", figures | dict(self._decoder.losses))
 
     def _read(self) -> None:
-        for chunk in self._link.take():
-            if not chunk.data:
-                self._decoder.reset()
-                self._clocks.clear()
-                continue
-            reports = self._decoder.feed(chunk.data)
-            if reports:
-                self._publish(reports, chunk.arrival_ns)
+        with self._decoding:
+            for chunk in self._link.take():
+                self._decode(chunk)
+
+    def _decode(self, chunk: Chunk) -> None:
+        if not chunk.data:
+            self._decoder.reset()
+            self._clocks.clear()
+            return
+        reports = self._decoder.feed(chunk.data)
+        if reports:
+            self._publish(reports, chunk.arrival_ns)
 
     def _publish(self, reports: list[BearingReport], arrival_ns: int) -> None:
         self._reports += len(reports)

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import time
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -15,12 +14,13 @@ from tf2_msgs.msg import TFMessage
 
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import to_ns
+from mine_loc_core.stamps import NS_PER_S, to_ns
 from mine_loc_core.verdicts import Source
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import Estimate, is_position
@@ -46,10 +46,8 @@ _SOURCES = (Source.RANGE, Source.TDOA, Source.UWB_POSE, Source.STEP, Source.LAND
 class Fusion(NodeBase):
     """Runs one estimator a person."""
 
+    default_name = "fusion"
     parameter_class = FusionParameters
-
-    def __init__(self) -> None:
-        super().__init__("fusion")
 
     def configure(self) -> None:
         """Load site and people; a bad file refuses the transition."""
@@ -121,11 +119,11 @@ class Fusion(NodeBase):
         tracked = self._tracked.get(epoch.person)
         if tracked is None:
             return
-        started = time.perf_counter()
+        started_ns = self.steady_ns()
         height_m = None if self._site.dimensions == 3 else self._height_m(tracked)
         inputs, refused = to_inputs(epoch, self._intake, height_m, self.parameters.arrival_sd_m**2)
         verdicts = refused + tracked.update(inputs, late=epoch.late)
-        tracked.costs_s.append(time.perf_counter() - started)
+        tracked.costs_s.append((self.steady_ns() - started_ns) / NS_PER_S)
         if epoch.ranges:
             tracked.los_fraction = los_fraction(epoch)
         if epoch.steps:

@@ -11,8 +11,9 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mine_loc_core.nodes.conversions import to_point, to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import to_ns
 from mine_loc_fusion.map_drawing import Drawing, draw_person, draw_site, draw_vehicles, draw_zones
@@ -28,10 +29,8 @@ _SHOWN_S = 1.0  # a drawing that is not repeated vanishes, so that no frozen map
 class Markers(NodeBase):
     """Draws while somebody looks."""
 
+    default_name = "markers"
     parameter_class = MarkersParameters
-
-    def __init__(self) -> None:
-        super().__init__("markers")
 
     def configure(self) -> None:
         """Load the site and draw it; a bad file refuses the transition."""

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,9 @@ from mine_loc_interfaces.srv import Reset
 
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 from mine_loc_fusion.nodes.proximity_messages import to_alarm_array, to_guard_rules, to_pose2, to_seen
@@ -29,10 +29,8 @@ _PERIOD_S = 1.0
 class ProximityNode(NodeBase):
     """Watches the zones of a site and tells each vehicle that carries a danger zone whether it may run."""
 
+    default_name = "proximity"
     parameter_class = ProximityParameters
-
-    def __init__(self) -> None:
-        super().__init__("proximity")
 
     def configure(self) -> None:
         """Load site and people; a bad file refuses the transition."""
@@ -79,11 +77,11 @@ class ProximityNode(NodeBase):
         if array.header.frame_id != self._map_frame:
             self._refused["frame"] += 1
             return
-        if self._guard.take_people([to_seen(person) for person in array.people], time.monotonic_ns()):
+        if self._guard.take_people([to_seen(person) for person in array.people], self.steady_ns()):
             self._publish_alarms()
 
     def _on_fusion_health(self, _: msg.FusionHealth) -> None:
-        self._guard.take_sign_of_life(time.monotonic_ns())
+        self._guard.take_sign_of_life(self.steady_ns())
 
     def _vehicle_callback(self, name: str) -> Any:
         def on_pose(message: PoseStamped) -> None:
@@ -98,7 +96,7 @@ class ProximityNode(NodeBase):
         return on_pose
 
     def _beat(self) -> None:
-        now_ns, steady_ns = self.now_ns(), time.monotonic_ns()
+        now_ns, steady_ns = self.now_ns(), self.steady_ns()
         for name, sender in self._senders.items():
             order = self._orders[name] = sender.order(self._guard.stop_reasons(name, now_ns, steady_ns))
             message = msg.ProximityStop(

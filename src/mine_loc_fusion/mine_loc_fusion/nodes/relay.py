@@ -10,8 +10,9 @@ from mine_loc_interfaces.msg import ProximityStop
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_stamp_ns
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import Host, NodeBase
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.site import Relay, load_site
 from mine_loc_fusion.proximity_parameters import RelayParameters
 from mine_loc_fusion.relay_driver import RelayDriver
@@ -22,10 +23,11 @@ from mine_loc_fusion.stop_signal import StopOrder, StopReceiver
 class RelayNode(NodeBase):
     """Energises the outputs of one relay of the site while its vehicle may run."""
 
+    default_name = "relay"
     parameter_class = RelayParameters
 
-    def __init__(self) -> None:
-        super().__init__("relay")
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
         self._driver: RelayDriver | None = None
 
     def configure(self) -> None:

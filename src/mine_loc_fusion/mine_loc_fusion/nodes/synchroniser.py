@@ -10,8 +10,9 @@ from mine_loc_interfaces import msg
 
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_MS, to_ns
@@ -25,10 +26,8 @@ _PEOPLE_PERIOD_S = 1.0
 class SynchroniserNode(NodeBase):
     """Joins the streams by person and instant."""
 
+    default_name = "synchroniser"
     parameter_class = SynchroniserParameters
-
-    def __init__(self) -> None:
-        super().__init__("synchroniser")
 
     def configure(self) -> None:
         """Load site and people; a bad file refuses the transition."""

@@ -9,8 +9,9 @@ from sensor_msgs.msg import FluidPressure, Imu, MagneticField
 from mine_loc_core.device_clock import DeviceClock
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.serial_link import SerialLink
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
@@ -27,16 +28,14 @@ _DRAIN_PERIOD_S = 0.005
 class N100Driver(NodeBase):
     """Publishes imu/data, imu/mag and, where a barometer is fitted, imu/pressure."""
 
+    default_name = "n100_driver"
     parameter_class = N100DriverParameters
-
-    def __init__(self) -> None:
-        super().__init__("n100_driver")
 
     def configure(self) -> None:
         """Create the publishers; the line is opened when the node becomes active."""
         for name in ("person", "port"):
             if not getattr(self.parameters, name):
-                raise ConfigurationError(f"{self.get_name()}: {name}: empty; allowed: any but an empty text")
+                raise ConfigurationError(f"{self.name}: {name}: empty; allowed: any but an empty text")
         self._imu = self.publish_to(Imu, "imu/data", EVENTS)
         self._mag = self.publish_to(MagneticField, "imu/mag", EVENTS)
         self._pressure = self.publish_to(FluidPressure, "imu/pressure", EVENTS)

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -19,8 +18,9 @@ from tf2_msgs.msg import TFMessage
 from mine_loc_core import quaternion
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.site import Site, load_site
 from mine_loc_core.stamps import NS_PER_S
@@ -48,15 +48,15 @@ _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says noth
 class Track:
     """One person's dead reckoning and the ends of its topics."""
 
-    def __init__(self, person: Person, n100: N100, activities: ActivityModel, site: Site) -> None:
+    def __init__(self, person: Person, n100: N100, activities: ActivityModel, site: Site, heard_ns: int) -> None:
         self.person = person
         self._n100 = n100
         self.entities: list[Any] = []  # what is released with the track
         self._activities = activities
         self._site = site
         self.odometry: Any = None
-        self.heard_s = time.monotonic()
-        self.field_heard_s = -math.inf
+        self.heard_ns = heard_ns
+        self.field_heard_ns: int | None = None
         self.faults_reported = 0
         self.restart()
 
@@ -84,10 +84,8 @@ class Track:
 class Pdr(NodeBase):
     """Publishes pdr/steps, activity, landmark_fix and stride_updates, each <person>/odometry and its transforms."""
 
+    default_name = "pdr"
     parameter_class = PdrParameters
-
-    def __init__(self) -> None:
-        super().__init__("pdr")
 
     def configure(self) -> None:
         """Read the people and listen to each who wears an N100."""
@@ -137,7 +135,7 @@ class Pdr(NodeBase):
                 self._tracks[name] = self._new_track(person, person.n100)
 
     def _new_track(self, person: Person, n100: N100) -> Track:
-        track = Track(person, n100, self._activity_model, self._site)
+        track = Track(person, n100, self._activity_model, self._site, self.steady_ns())
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
         name = f"/{person.name}/imu"
         imu = self.subscribe(Imu, f"{name}/data", lambda message: self._on_imu(track, message), STREAM, raw=True)
@@ -151,7 +149,7 @@ class Pdr(NodeBase):
         sample = imu_sample(message)
         step = track.pdr.push(sample)
         track.samples += 1
-        track.heard_s = time.monotonic()
+        track.heard_ns = self.steady_ns()
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
             self._refine_stride(track, step)
@@ -180,7 +178,7 @@ class Pdr(NodeBase):
 
     def _on_field(self, track: Track, message: bytes) -> None:
         track.pdr.push_field(field_sample(message))
-        track.field_heard_s = time.monotonic()
+        track.field_heard_ns = self.steady_ns()
 
     def _follow_heading(self, track: Track, sample: ImuSample, heading_rad: float, step: StepEvent | None) -> None:
         if (activity := track.recognise(sample, heading_rad)) is not None:
@@ -246,12 +244,16 @@ class Pdr(NodeBase):
             return False, f"{request.person}: {refusal}"
         return True, f"{request.person} is followed from there"
 
+    def _hears_field(self, track: Track) -> bool:
+        heard_ns = track.field_heard_ns
+        return heard_ns is not None and self.steady_ns() - heard_ns < _SILENT_S * NS_PER_S
+
     def _track_health(self, track: Track) -> Health:
-        name, pdr, silent_s = track.person.name, track.pdr, time.monotonic() - track.heard_s
+        name, pdr, silent_s = track.person.name, track.pdr, (self.steady_ns() - track.heard_ns) / NS_PER_S
         faults = sum(pdr.faults.values())
         new_faults, track.faults_reported = faults - track.faults_reported, faults
         values = {"samples": track.samples, "steps": pdr.step_count, **pdr.faults}
-        values["magnetometer"] = "heard" if time.monotonic() - track.field_heard_s < _SILENT_S else "absent"
+        values["magnetometer"] = "heard" if self._hears_field(track) else "absent"
         values["stride_k"] = f"{track.refiner.known.scale:.3f} ± {math.sqrt(track.refiner.known.variance):.3f}"
         values |= {f"stretches_{verdict}": count for verdict, count in track.refiner.verdicts.items()}
         values |= {f"field_{verdict}": count for verdict, count in pdr.magnetic.verdicts.items()}

@@ -10,8 +10,10 @@ from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArr
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.conversions import to_time
+from mine_loc_core.nodes.node_base import Host, NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.serial_link import Chunk, SerialLink
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_MS
@@ -26,10 +28,11 @@ from mine_loc_uwb.wire.starting import make_starter
 class Dwm1000Driver(NodeBase):
     """Reads one port for ever and publishes what its messages say, stamped with the instant of measurement."""
 
+    default_name = "dwm1000_driver"
     parameter_class = Dwm1000DriverParameters
 
-    def __init__(self) -> None:
-        super().__init__("dwm1000_driver")
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
         self._decoding = threading.Lock()  # the reader's thread decodes and publishes; the executor does the rest
 
     def configure(self) -> None:
@@ -142,7 +145,7 @@ class Dwm1000Driver(NodeBase):
             tick_period=self._decoder.tick_period_s,
             counter_bits=self._decoder.counter_bits,
         )
-        info.header.stamp = self.get_clock().now().to_msg()
+        info.header.stamp = to_time(self.now_ns())
         self._info.publish(info)
 
     def _talk(self) -> None:

@@ -2,10 +2,8 @@
 
 import os
 import sys
-import threading
-import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -14,9 +12,10 @@ from typing import NoReturn
 from mine_loc_interfaces.msg import CirFrame, LinkState, LosModelInfo
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.node_base import Host, NodeBase, Worker
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_uwb.cir_input import Refusal
 from mine_loc_uwb.link_judgement import Classifier, LinkJudge, load_classifier
 from mine_loc_uwb.nodes.cir_messages import tap_count, to_cir_frames, to_link_state
@@ -24,8 +23,6 @@ from mine_loc_uwb.parameters import LosClassifierParameters
 
 _MOST_WAITING = 1024
 """Frames that wait for judgement; the oldest are given up beyond."""
-_GATHER_S = 2e-4
-"""So long after a frame the others of its round are there; one batch of four costs a third of four batches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,44 +34,15 @@ class _Model:
     problem: str = ""
 
 
-class _Worker(threading.Thread):
-    """Prepares, and then works whenever it was woken, until it is ended."""
-
-    def __init__(self, prepare: Callable[[], None], work: Callable[[], None]) -> None:
-        super().__init__(daemon=True)
-        self._prepare, self._work = prepare, work
-        self._woken = threading.Event()
-        self._ended = False
-
-    def run(self) -> None:
-        """Of the thread."""
-        self._prepare()
-        while True:
-            self._woken.wait()
-            if self._ended:
-                return
-            time.sleep(_GATHER_S)
-            self._woken.clear()
-            self._work()
-
-    def wake(self) -> None:
-        """There is work."""
-        self._woken.set()
-
-    def end(self) -> None:
-        """There will be no more."""
-        self._ended = True
-        self._woken.set()
-
-
 class LosClassifier(NodeBase):
     """Judges what has arrived, as one batch; by the power rule if no model can be had."""
 
+    default_name = "los_classifier"
     parameter_class = LosClassifierParameters
 
-    def __init__(self) -> None:
-        super().__init__("los_classifier")
-        self._worker: _Worker | None = None
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._worker: Worker | None = None
 
     def configure(self) -> None:
         """Begin to load the model, in the thread that is going to judge. Frames wait until it is there."""
@@ -87,8 +55,7 @@ class LosClassifier(NodeBase):
         self._states = self.publish_to(LinkState, "uwb/link_state", EVENTS)
         self._info = self.publish_to(LosModelInfo, "~/model_info", LATCHED)
         # torch takes seconds to import, in which the node must answer and be able to stop
-        self._worker = _Worker(self._load, self.guarded(self._judge, "judgement"))
-        self._worker.start()
+        self._worker = self.host.make_worker(self._load, self.guarded(self._judge, "judgement"))
         self.subscribe(CirFrame, "uwb/cir", self._on_frame, EVENTS)
 
     def activate(self) -> None:
@@ -118,7 +85,7 @@ class LosClassifier(NodeBase):
             model = _Model(*load_classifier(path, self.parameters.device))
         except Exception as error:  # noqa: BLE001 whatever is wrong with it, the power rule serves
             model = _Model(None, {}, str(error) or repr(error))
-            self.get_logger().warning(f"no model, the power rule serves: {model.problem}")
+            self.host.warn(f"no model, the power rule serves: {model.problem}")
         self._links = LinkJudge(model.classifier)
         self._model = model
         if self.active:  # otherwise `activate` does
@@ -131,7 +98,7 @@ class LosClassifier(NodeBase):
             training_data=", ".join(map(str, model.card.get("data", []))),
             balanced_accuracy=float(model.card.get("figures", {}).get("balanced_accuracy", float("nan"))),
         )
-        info.header.stamp = self.get_clock().now().to_msg()
+        info.header.stamp = to_time(self.now_ns())
         self._info.publish(info)
 
     def _on_frame(self, frame: CirFrame) -> None:

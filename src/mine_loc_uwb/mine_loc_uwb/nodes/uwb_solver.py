@@ -1,7 +1,6 @@
 """Positions from ranging rounds, and a verdict on every range."""
 
 import sys
-import time
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,12 +17,14 @@ from mine_loc_interfaces.msg import (
 from mine_loc_interfaces.srv import SetAnchorEnabled
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns
-from mine_loc_core.nodes.node_base import NodeBase, run
+from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
+from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Verdict
 from mine_loc_uwb.anchor_frame import anchor_frame
 from mine_loc_uwb.fix import Fix, FixStatus
@@ -33,16 +34,14 @@ from mine_loc_uwb.range_correction_file import load_range_correction
 from mine_loc_uwb.round_solver import RoundSolver, rehearse
 
 _PERIOD_S = 1.0
-_FORGET_AFTER_S = 60.0
+_FORGET_AFTER_NS = 60 * NS_PER_S
 
 
 class UwbSolver(NodeBase):
     """Solves each round and each blink as it comes."""
 
+    default_name = "uwb_solver"
     parameter_class = UwbSolverParameters
-
-    def __init__(self) -> None:
-        super().__init__("uwb_solver")
 
     def configure(self) -> None:
         """Load site, people and range correction; a bad file refuses the transition."""
@@ -59,7 +58,7 @@ class UwbSolver(NodeBase):
         self._map_version = 0
         self._rounds = self._fixes = 0
         self._refused: Counter[str] = Counter()
-        self._heard_s: dict[int, float] = {}
+        self._heard_ns: dict[int, int] = {}
         self.serve(SetAnchorEnabled, "~/set_anchor_enabled", self._set_anchor_enabled)
         self.every(_PERIOD_S, self._each_second)
         self.subscribe(UwbRangeArray, "uwb/ranges", self._on_round, EVENTS)
@@ -90,9 +89,9 @@ class UwbSolver(NodeBase):
 
     def _each_second(self) -> None:
         self._people.poll()
-        now_s = time.monotonic()
-        for tag_id in [tag_id for tag_id, heard_s in self._heard_s.items() if now_s - heard_s > _FORGET_AFTER_S]:
-            del self._heard_s[tag_id]
+        before_ns = self.steady_ns() - _FORGET_AFTER_NS
+        for tag_id in [tag_id for tag_id, heard_ns in self._heard_ns.items() if heard_ns < before_ns]:
+            del self._heard_ns[tag_id]
             self._solver.forget(tag_id)
 
     def _on_round(self, array: UwbRangeArray) -> None:
@@ -115,7 +114,7 @@ class UwbSolver(NodeBase):
     def _publish(
         self, fix: Fix | None, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str
     ) -> None:
-        self._heard_s[array.tag_id] = time.monotonic()
+        self._heard_ns[array.tag_id] = self.steady_ns()
         self._rounds += 1
         refused = [verdict.reason.name.lower() for verdict in verdicts if not verdict.accepted]
         self._refused.update(refused)
@@ -146,7 +145,7 @@ class UwbSolver(NodeBase):
     def _publish_map(self) -> None:
         self._map_version += 1
         message = AnchorMap(map_version=self._map_version)
-        message.header.stamp = self.get_clock().now().to_msg()
+        message.header.stamp = to_time(self.now_ns())
         message.header.frame_id = self._frame.name
         for anchor in self._frame.anchors:
             variance = anchor.position_sd_m**2
