@@ -36,6 +36,7 @@ ROSDEP = {  # import name → rosdep key
     "matplotlib": "python3-matplotlib",
     "numba": "python3-numba",
     "sklearn": "python3-sklearn",
+    "threadpoolctl": "python3-threadpoolctl",
 }
 MOST_LINES = 400
 

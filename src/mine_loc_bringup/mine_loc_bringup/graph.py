@@ -6,7 +6,7 @@ import operator
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -34,6 +34,7 @@ class NodeSpec:
     name: str
     namespace: str = "/"
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    driven_by: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Parameter files of the nodes (`<site>/params/<node>.yaml`, ROS parameter YAML), judged before anything starts."""
 
+import fnmatch
 import importlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -32,6 +33,17 @@ def find_parameter_files(site_folder: Path, nodes: Mapping[str, tuple[str, froze
         found[file.stem] = file.resolve()
     refuse(problems)
     return found
+
+
+def read_parameters(file: Path, full_name: str) -> dict[str, Any]:
+    """What a checked parameter file says to the node of a full name; later sections win, as in rcl."""
+    source = load_yaml(file)
+    values: dict[str, Any] = {}
+    for path, section in _sections(source, source.content, ()):
+        pattern = "/" + "/".join(str(step).strip("/") for step in path[:-1])
+        if fnmatch.fnmatchcase(full_name, pattern.replace("/**", "*")):
+            values |= section
+    return values
 
 
 def _load_class(path: str) -> type[Any]:

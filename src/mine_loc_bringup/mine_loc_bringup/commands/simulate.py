@@ -5,7 +5,8 @@ with these lines to build/sim/site, and plays until Ctrl-C or the end; run the g
 prints. The UWB receivers speak their format of site.yaml: mine_loc (for auto too), trek1000 or dwm1001_shell; N100s
 speak FDILink; direction-finding monitors report emitters, of which everybody carries one ($MLDF). Same seed, same
 bytes. With --bag nothing is played: what the drivers would publish of the bytes is written at once, together with the
-truth (truth/<person>/pose, truth/steps, truth/link_state). Monitors have no driver yet, so a bag has nothing of them.
+truth (truth/<person>/pose, truth/steps, truth/link_state); the site folder lies in the bag's, as mine-loc replay
+expects it.
 
 Faults are written KIND@START+DURATION[:DEVICE], with seconds since the beginning:
   noise, truncation, stall, unplug, clock_step     of a line: a receiver's name, person/n100 or monitor_<id>;
@@ -69,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     site = load_site(arguments.site)
     scenario, faults = _scene(site, arguments)
     if arguments.bag:
-        return _write_bag(scenario, faults, arguments.bag)
+        return _write_bag(scenario, faults, arguments)
     return _play(scenario, faults, arguments)
 
 
@@ -88,9 +89,10 @@ def _scene(site: Site, arguments: argparse.Namespace) -> tuple[Scenario, list[Fa
     return Scenario(site, people, options), faults
 
 
-def _write_bag(scenario: Scenario, faults: list[Fault], path: Path) -> int:
+def _write_bag(scenario: Scenario, faults: list[Fault], arguments: argparse.Namespace) -> int:
     from mine_loc_bringup.nodes.simulation_bag import write_bag  # noqa: PLC0415 only here ROS is needed
 
+    path: Path = arguments.bag
     if path.exists():
         raise ConfigurationError(f"--bag: {path} is there already; allowed: a new name")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -101,6 +103,8 @@ def _write_bag(scenario: Scenario, faults: list[Fault], path: Path) -> int:
         for done_ns, written in write_bag(scenario, faults, path):
             messages += written
             progress.update(task, completed=done_ns / NS_PER_S)
+    nowhere = {line: f"/dev/null/{line}" for line in scenario.lines}
+    write_site_folder(arguments.site, path / "site", nowhere, scenario.people)
     seconds = scenario.options.seconds
     print(f"{path}: {messages} messages, {seconds:g} s in {time.monotonic() - began_s:.1f} s")
     return 0

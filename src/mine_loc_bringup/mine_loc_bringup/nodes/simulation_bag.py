@@ -3,6 +3,7 @@
 The bytes go through the drivers' own decoders, stamps and conversions, so losses and faults leave the same traces.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,6 +14,9 @@ from mine_loc_interfaces.msg import CirFrame, LinkState, Step, TdoaArray, UwbRan
 from rclpy.serialization import serialize_message
 
 from mine_loc_bringup.bag_writer import BagWriter
+from mine_loc_coarse.bearing_stream import BearingStream
+from mine_loc_coarse.nodes.messages import to_bearing_arrays
+from mine_loc_coarse.parameters import MonitorDriverParameters
 from mine_loc_core.device_clock import DeviceClock
 from mine_loc_core.nodes.conversions import to_point, to_time
 from mine_loc_core.people import Person
@@ -24,7 +28,7 @@ from mine_loc_pdr.parameters import N100DriverParameters
 from mine_loc_sim.byte_streams import line_emitters
 from mine_loc_sim.faults import Fault
 from mine_loc_sim.scenario import Scenario, TrueLink
-from mine_loc_sim.scene import line_of, wire_format
+from mine_loc_sim.scene import line_of, monitor_line, wire_format
 from mine_loc_sim.timed_bytes import Arrival, Cable
 from mine_loc_sim.walker import TrueStep
 from mine_loc_uwb.device_stamps import DeviceStamps
@@ -92,6 +96,20 @@ class _UwbDriver:
                 yield at_ns, _TOPICS[type(message)], message
 
 
+class _MonitorDriver:
+    def __init__(self) -> None:
+        self._stream = BearingStream()
+        self._variance_rad2 = math.radians(MonitorDriverParameters().azimuth_sd_deg) ** 2
+
+    def entries(self, arrival: Arrival) -> Iterator[Entry]:
+        at_ns, what = arrival
+        if isinstance(what, Cable):
+            self._stream.reconnected()
+            return
+        for message in to_bearing_arrays(self._stream.feed(START_NS + at_ns, what), self._variance_rad2):
+            yield at_ns, "coarse/bearings", message
+
+
 class _N100Driver:
     def __init__(self, person: Person) -> None:
         self._person = person.name
@@ -112,6 +130,7 @@ class _N100Driver:
 
 def _drivers(scenario: Scenario) -> dict[str, _Driver]:
     drivers: dict[str, _Driver] = {receiver.name: _UwbDriver(receiver) for receiver in scenario.site.uwb_receivers}
+    drivers |= {monitor_line(monitor): _MonitorDriver() for monitor in scenario.site.monitors}
     return drivers | {line_of(person): _N100Driver(person) for person in scenario.people if person.n100}
 
 

@@ -1,6 +1,8 @@
 """Reports and regions as ROS messages, and back."""
 
-from mine_loc_interfaces.msg import Bearing, CoarseRegion
+from collections.abc import Iterator, Sequence
+
+from mine_loc_interfaces.msg import Bearing, BearingArray, CoarseRegion
 
 from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_coarse.situation import Region
@@ -9,6 +11,17 @@ from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 _LAST_UINT32 = 2**32 - 1
 _MOST_NEIGHBOURS = 256
 _MOST_NAMES = 64
+_MOST_BEARINGS = 4096
+
+
+def to_bearing_arrays(reports: Sequence[tuple[BearingReport, int]], variance_rad2: float) -> Iterator[BearingArray]:
+    """Reports with the ROS time [ns] of their measurement, in messages that are not too long."""
+    for start in range(0, len(reports), _MOST_BEARINGS):
+        part = reports[start : start + _MOST_BEARINGS]
+        message = BearingArray(bearings=[to_bearing(report, stamp_ns, variance_rad2) for report, stamp_ns in part])
+        message.header.stamp = to_time(max(stamp_ns for _, stamp_ns in part))
+        message.header.frame_id = "map"
+        yield message
 
 
 def to_bearing(report: BearingReport, stamp_ns: int, variance_rad2: float) -> Bearing:

@@ -4,27 +4,20 @@ import math
 import sys
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Iterable
 
 from mine_loc_interfaces.msg import BearingArray
 
 from mine_loc_coarse.bearing_report import BearingReport
-from mine_loc_coarse.monitor_clock import MonitorClock
-from mine_loc_coarse.monitor_protocol import decoder
-from mine_loc_coarse.nodes.messages import to_bearing
+from mine_loc_coarse.bearing_stream import BearingStream
+from mine_loc_coarse.nodes.messages import to_bearing_arrays
 from mine_loc_coarse.parameters import MonitorDriverParameters
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import Host, NodeBase
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.serial_link import Chunk, SerialLink
-
-_MOST_MONITORS = 256
-_MOST_BEARINGS = 4096
-_LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 
 
 class MonitorDriver(NodeBase):
@@ -46,9 +39,8 @@ class MonitorDriver(NodeBase):
     def activate(self) -> None:
         """Open the port, now or as soon as it appears."""
         p = self.parameters
-        self._decoder = decoder()
-        self._clocks: OrderedDict[int, MonitorClock] = OrderedDict()
-        self._reports = self._losses_before = self._impossible_stamps = 0
+        self._stream = BearingStream(by_monitor=p.stamp_by_monitor)
+        self._losses_before = 0
         self._last_report_s = time.monotonic()
         read = self.guarded(self._read, "serial data")
         self._link = SerialLink(p.port, p.baud, clock=self.now_ns, wake=read, silence_s=p.silence_s)
@@ -61,12 +53,13 @@ class MonitorDriver(NodeBase):
     def parameters_changed(self) -> None:
         """Trust in the monitors' clocks takes effect at once."""
         with self._decoding:
-            self._clocks.clear()
+            self._stream.by_monitor = self.parameters.stamp_by_monitor
+            self._stream.restart_clocks()
 
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Offsets learnt against the old time are void."""
         with self._decoding:
-            self._clocks.clear()
+            self._stream.restart_clocks()
 
     def health(self) -> Iterable[Health]:
         """The line, and what is decoded from it."""
@@ -78,13 +71,12 @@ class MonitorDriver(NodeBase):
             yield Health("port", Level.ERROR, f"no report for {silent_s:.1f} s", {"port": status.port})
         else:
             yield Health("port", Level.OK, f"reading {status.port}", {"connections": status.connections})
-        losses = sum(self._decoder.losses.values()) + self._impossible_stamps
-        level = Level.WARN if losses > self._losses_before else Level.OK
-        self._losses_before = losses
-        figures = {"reports": self._reports, "bytes": status.bytes_read, "bytes_dropped": status.bytes_dropped}
-        figures["impossible_stamp"] = self._impossible_stamps
-        figures["clock_resets"] = sum(clock.resets for clock in self._clocks.values())
-        yield Health("decoder", level, "mldf", figures | dict(self._decoder.losses))
+        losses = self._stream.losses
+        level = Level.WARN if losses.total() > self._losses_before else Level.OK
+        self._losses_before = losses.total()
+        figures = {"reports": self._stream.reports, "bytes": status.bytes_read, "bytes_dropped": status.bytes_dropped}
+        figures["clock_resets"] = self._stream.clock_resets
+        yield Health("decoder", level, "mldf", figures | dict(losses))
 
     def _read(self) -> None:
         with self._decoding:
@@ -93,36 +85,14 @@ class MonitorDriver(NodeBase):
 
     def _decode(self, chunk: Chunk) -> None:
         if not chunk.data:
-            self._decoder.reset()
-            self._clocks.clear()
-            return
-        reports = self._decoder.feed(chunk.data)
-        if reports:
-            self._publish(reports, chunk.arrival_ns)
+            self._stream.reconnected()
+        elif reports := self._stream.feed(chunk.arrival_ns, chunk.data):
+            self._publish(reports)
 
-    def _publish(self, reports: list[BearingReport], arrival_ns: int) -> None:
-        self._reports += len(reports)
+    def _publish(self, reports: list[tuple[BearingReport, int]]) -> None:
         self._last_report_s = time.monotonic()
-        variance_rad2 = math.radians(self.parameters.azimuth_sd_deg) ** 2
-        stamped = [(report, self._stamp_ns(report, arrival_ns)) for report in reports]
-        good = [each for each in stamped if 0 <= each[1] <= _LAST_STAMP_NS]
-        self._impossible_stamps += len(stamped) - len(good)
-        for start in range(0, len(good), _MOST_BEARINGS):
-            part = good[start : start + _MOST_BEARINGS]
-            message = BearingArray(bearings=[to_bearing(report, stamp_ns, variance_rad2) for report, stamp_ns in part])
-            message.header.stamp = to_time(max(stamp_ns for _, stamp_ns in part))
-            message.header.frame_id = "map"
+        for message in to_bearing_arrays(reports, math.radians(self.parameters.azimuth_sd_deg) ** 2):
             self._bearings.publish(message)
-
-    def _stamp_ns(self, report: BearingReport, arrival_ns: int) -> int:
-        """ROS time of a measurement."""
-        if self.parameters.stamp_by_monitor:
-            return report.stamp_ns
-        clock = self._clocks.pop(report.monitor_id, None) or MonitorClock()
-        self._clocks[report.monitor_id] = clock
-        if len(self._clocks) > _MOST_MONITORS:
-            self._clocks.popitem(last=False)
-        return clock.stamp(report.stamp_ns, arrival_ns)
 
 
 def main() -> int:

@@ -84,7 +84,8 @@ class NodeBase:
         self.active = False
         self.parameters = host.declare(self.parameter_class)
         self._made: dict[Any, None] = {}  # what `configure` created, in order
-        self._faults: dict[str, int] = {}
+        self.faults: dict[str, int] = {}
+        """Exceptions in callbacks, by where."""
         self._last_fault = ""
 
     # What a subclass overrides.
@@ -214,8 +215,8 @@ class NodeBase:
     def statuses(self) -> list[Health]:
         """Everything for the diagnostics."""
         found = [*self.health()] if self.active else []
-        if self._faults:
-            found.append(Health("callbacks", Level.ERROR, self._last_fault, self._faults))
+        if self.faults:
+            found.append(Health("callbacks", Level.ERROR, self._last_fault, self.faults))
         else:
             found.append(Health("callbacks", Level.OK, "running" if self.active else "inactive"))
         return found
@@ -232,6 +233,6 @@ class NodeBase:
         return False
 
     def _fault(self, where: str, error: Exception) -> None:
-        self._faults[where] = self._faults.get(where, 0) + 1
+        self.faults[where] = self.faults.get(where, 0) + 1
         self._last_fault = f"{where}: {error!r}"
         self.host.error(self._last_fault, repeated=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
@@ -24,12 +24,11 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
 from mine_loc_core.errors import ConfigurationError, MineLocError
-from mine_loc_core.health import Health
+from mine_loc_core.nodes.diagnostics import PERIOD_S, to_diagnostic_array
 from mine_loc_core.nodes.node_base import Callback, NodeBase
 from mine_loc_core.parameters import Constraint, constraints, from_mapping
 
 _WATCH_PERIOD_S = 0.2
-_DIAGNOSTICS_PERIOD_S = 1.0
 _JUMP_NS = 500_000_000
 _SPIN_S = 0.2
 _GATHER_S = 2e-4
@@ -51,7 +50,7 @@ class RosHost(LifecycleNode):
         )
         self._system_minus_steady_ns = time.time_ns() - time.monotonic_ns()
         self.make_timer(_WATCH_PERIOD_S, self._watch_system_clock)
-        self.make_timer(_DIAGNOSTICS_PERIOD_S, self._publish_diagnostics)
+        self.make_timer(PERIOD_S, self._publish_diagnostics)
 
     # What a node asks of its host.
 
@@ -182,9 +181,7 @@ class RosHost(LifecycleNode):
 
     def _publish_diagnostics(self) -> None:
         name = self.get_fully_qualified_name()
-        array = DiagnosticArray(status=[_status(name, health) for health in self.node.statuses()])
-        array.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(array)
+        self._diagnostics.publish(to_diagnostic_array(name, self.node.statuses(), self.now_ns()))
 
 
 class _WorkerThread(threading.Thread):
@@ -237,16 +234,6 @@ def _descriptor(constraint: Constraint, default: Any) -> ParameterDescriptor:
             )
         ]
     return descriptor
-
-
-def _status(node: str, health: Health) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=bytes([health.level]),
-        name=f"{node.lstrip('/')}: {health.component}",
-        message=health.message,
-        hardware_id=health.hardware_id,
-        values=[KeyValue(key=str(key), value=str(value)) for key, value in health.values.items()],
-    )
 
 
 def run(node_class: type[NodeBase]) -> int:
