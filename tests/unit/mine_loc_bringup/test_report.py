@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mine_loc_bringup.demo.recording import Truth
+from mine_loc_bringup.demo.playback import Truth
 from mine_loc_bringup.demo.report import Track, person_report, plot, together
 
 TIMES_S = np.arange(0.0, 20.0, 0.1)

@@ -29,10 +29,11 @@ from rich.table import Table
 
 from mine_loc_bringup.console import Console
 from mine_loc_bringup.demo import generated, isas_walk, trek_lab
-from mine_loc_bringup.demo.recording import DATA_VARIABLE, Recording
+from mine_loc_bringup.demo.playback import Playback
 from mine_loc_bringup.demo.report import PersonReport, Track, person_report, plot, together
 from mine_loc_bringup.demo.table import people_table
 from mine_loc_bringup.graph import expand, node_environment
+from mine_loc_bringup.recordings.public_data import DATA_VARIABLE
 from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.errors import ConfigurationError
@@ -40,7 +41,7 @@ from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import Site, load_site
 from mine_loc_sim.serial_lines import Player, PseudoSerial
 
-_RECORDINGS: dict[str, Callable[[], Recording]] = {
+_RECORDINGS: dict[str, Callable[[], Playback]] = {
     "m1l": trek_lab.load,
     "isas_walk1": isas_walk.load,
 }
@@ -72,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     return asyncio.run(demo.run())
 
 
-def _recording(arguments: argparse.Namespace) -> Recording:
+def _recording(arguments: argparse.Namespace) -> Playback:
     name = arguments.recording
     if arguments.site and name not in {"", _SIMULATED}:
         raise ConfigurationError(
@@ -88,7 +89,7 @@ def _recording(arguments: argparse.Namespace) -> Recording:
 
 
 class _Demo:
-    def __init__(self, recording: Recording, arguments: argparse.Namespace) -> None:
+    def __init__(self, recording: Playback, arguments: argparse.Namespace) -> None:
         self._recording = recording
         self._seconds = arguments.seconds
         self._out: Path = arguments.out.resolve()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from mine_loc_bringup.demo.recording import Truth
+from mine_loc_bringup.demo.playback import Truth
 from mine_loc_core.alignment import Alignment, align, truth_at
 from mine_loc_core.error_measures import availability, horizontal_error
 
