@@ -30,8 +30,9 @@ from rich.table import Table
 from mine_loc_bringup.console import Console
 from mine_loc_bringup.demo import generated, isas_walk, trek_lab
 from mine_loc_bringup.demo.playback import Playback
-from mine_loc_bringup.demo.report import PersonReport, Track, person_report, plot, together
+from mine_loc_bringup.demo.report import PersonReport, person_report, plot, together
 from mine_loc_bringup.demo.table import people_table
+from mine_loc_bringup.evaluation.track import Track
 from mine_loc_bringup.graph import expand, node_environment
 from mine_loc_bringup.recordings.public_data import DATA_VARIABLE
 from mine_loc_bringup.site_folder import write_site_folder
@@ -183,14 +184,14 @@ class _Demo:
 
     def _track(self, person: str) -> Track:
         outputs = [o for o in self._watch.watched.outputs.get(person, []) if o.received_ns >= self._started_ns]
-        seconds = [((o.stamp_ns - self._started_ns) / 1e9, (o.received_ns - self._started_ns) / 1e9) for o in outputs]
-        times = np.array(seconds, dtype=np.float64).reshape(-1, 2)
+        covariance = [((xx, xy), (xy, yy)) for xx, xy, yy in (o.covariance_m2 for o in outputs)]
         return Track(
-            times[:, 0],
-            times[:, 1],
-            np.array([(o.x_m, o.y_m) for o in outputs], dtype=np.float64).reshape(-1, 2),
-            np.array([o.ce95_m for o in outputs]),
-            np.array([o.mode for o in outputs], dtype=np.int64),
+            stamp_ns=np.array([o.stamp_ns for o in outputs], np.int64),
+            logged_ns=np.array([o.received_ns for o in outputs], np.int64),
+            position_m=np.array([(o.x_m, o.y_m) for o in outputs], np.float64).reshape(-1, 2),
+            covariance_m2=np.array(covariance, np.float64).reshape(-1, 2, 2),
+            ce95_m=np.array([o.ce95_m for o in outputs], np.float64),
+            modes=np.array([o.mode for o in outputs], np.int64),
         )
 
     def _report(self, site: Site, supervisor: Supervisor) -> int:
@@ -198,7 +199,9 @@ class _Demo:
         missing: list[str] = []
         for truth in self._recording.truths:
             try:
-                reports.append(person_report(truth.person, self._track(truth.person), truth, self._ends_s))
+                reports.append(
+                    person_report(truth.person, self._track(truth.person), truth, self._started_ns, self._ends_s)
+                )
             except ValueError as error:
                 missing.append(str(error))
         receivers = {receiver.name for receiver in site.uwb_receivers}

@@ -28,7 +28,7 @@ def load() -> Playback:
         (sample.stamp_ns - start_ns, _imu(number, sample)) for number, (_, sample) in enumerate(walk.imu)
     ]
     times_s = np.array([(row[0] - start_ns) / NS_PER_S for row in walk.truth])
-    truths = [Truth(PERSON, times_s, np.array([row[1:4] for row in walk.truth]))]
+    truths = [Truth(PERSON, times_s, np.array([row[1] for row in walk.truth]))]
     lasts_s = max(rounds[-1][0], imu[-1][0]) / NS_PER_S
     return Playback(
         "isas_walk_uwb_imu ISAS-Walk1", "isas_walk", {"rtls": rounds, f"{PERSON}/n100": imu}, lasts_s, truths

@@ -38,4 +38,3 @@ class Playback:
     lasts_s: float
     truths: Sequence[Truth]
     people: Sequence[Person] | None = None
-

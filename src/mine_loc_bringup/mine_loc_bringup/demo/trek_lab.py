@@ -13,7 +13,7 @@ from mine_loc_uwb.wire.trek1000 import encode_round
 
 @dataclass(frozen=True, slots=True)
 class LabRun:
-    """Ranges (n, 4) [m], NaN = not measured, at `ms` (n,) since the first, and where Vicon saw the tag since it began."""
+    """Ranges (n, 4) [m], NaN = not measured, at `ms` (n,) since the first, and Vicon's track since its own."""
 
     ms: Integers
     ranges_m: Array
@@ -26,9 +26,7 @@ def read(run: str) -> LabRun:
     log = trek1000.read_log(folder / "exp_data" / "UWB_data_Ranges" / f"output_range_uwb_{run}.txt")
     vicon = trek1000.read_vicon(trek1000.vicon_file(folder, run) or folder / f"{run}.mat")
     times_s = (vicon.stamp_ns - vicon.stamp_ns[0]) / NS_PER_S
-    return LabRun(
-        log.ms_of_day - log.ms_of_day[0], log.ranges_m, Truth(trek1000.PERSON, times_s, vicon.position_m)
-    )
+    return LabRun(log.ms_of_day - log.ms_of_day[0], log.ranges_m, Truth(trek1000.PERSON, times_s, vicon.position_m))
 
 
 def load() -> Playback:

@@ -1,4 +1,4 @@
-"""What is known to be true, as the messages that bags carry it in: truth/<person>/pose, truth/steps, truth/link_state."""
+"""What is true, as bags carry it: truth/<person>/pose, truth/steps, truth/link_state."""
 
 from collections.abc import Sequence
 from math import nan

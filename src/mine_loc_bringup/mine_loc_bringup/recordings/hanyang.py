@@ -79,7 +79,7 @@ def read_truth(path: Path) -> tuple[Integers, Array]:
 
 
 def load(folder: Path, name: str) -> Recording:
-    """One run. That links are in line of sight is known of the LOS runs; which link is hidden when in the others, not."""
+    """One run. Links of LOS runs are known to be in line of sight; which are hidden when in the others is not told."""
     path = run_folder(folder, name)
     exchanges = read_exchanges(path)
     stamp_ns, position_m = read_truth(path)

@@ -1,4 +1,4 @@
-"""ipol_gait_lowerback (Voisard et al., IPOL 2023): people with an IMU at the lower back stand, walk, turn and walk back.
+"""ipol_gait_lowerback (Voisard et al., IPOL 2023): people with an IMU at the lower back walk there and back.
 
 A trial is NAME.json (who, and marks as sample indices) and NAME_lb.txt.gz: a line on the rate, a heading, then rows of
 packet counter, force X Y Z in m/s², rate X Y Z in rad/s, magnetic field X Y Z in arbitrary units. Sensor X is up, Z
@@ -105,7 +105,7 @@ def load(folder: Path, name: str) -> Recording:
     stamps_ns = START_NS + trial.counter * PERIOD_NS
     columns = (stamps_ns, trial.rate_rad_s, trial.force_m_s2, trial.field * _UNIT_FIELD_T)
     rows = zip(*(column.tolist() for column in columns), strict=True)
-    samples = [(stamp_ns, ImuMeasurement(stamp_ns, *map(tuple, vectors), None, None)) for stamp_ns, *vectors in rows]
+    samples = [(at_ns, ImuMeasurement(at_ns, tuple(w), tuple(a), tuple(m), None, None)) for at_ns, w, a, m in rows]
     walker = {
         "name": PERSON,
         "tag_id": 0,

@@ -10,6 +10,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from mine_loc_bringup.recordings.public_data import refused, required
 from mine_loc_bringup.recordings.recording import NO_FIELD, Instant, Recording, TrueTrack, Vector3, site_content
 from mine_loc_core.stamps import NS_PER_S
+from mine_loc_pdr.fdilink import Quaternion
 from mine_loc_pdr.n100_stream import ImuMeasurement
 from mine_loc_uwb.ranging import Range, RangingRound
 
@@ -27,8 +28,8 @@ class Walk:
     anchors_m: dict[int, Vector3] = field(default_factory=dict)
     rounds: list[tuple[Instant, RangingRound]] = field(default_factory=list)
     imu: list[tuple[int, ImuMeasurement]] = field(default_factory=list)
-    truth: list[tuple[int, *tuple[float, ...]]] = field(default_factory=list)
-    """Rows of stamp, x, y, z [m], w, x, y, z of the orientation, in the frame of the lighthouses."""
+    truth: list[tuple[int, Vector3, Quaternion]] = field(default_factory=list)
+    """Stamps, places and orientations (w, x, y, z), in the frame of the lighthouses."""
 
 
 def names(folder: Path) -> list[str]:
@@ -60,8 +61,8 @@ def read_walk(path: Path) -> Walk:
 def load(folder: Path, name: str) -> Recording:
     """One recording; the truth is in a frame of its own."""
     walk = read_walk(folder / "dataset" / f"{name}.bag")
-    table = np.array([row[1:] for row in walk.truth]).reshape(-1, 7)
-    stamp_ns, rising = np.unique(np.array([row[0] for row in walk.truth], np.int64), return_index=True)
+    stamps_ns, places_m, orientations = (np.array(column) for column in zip(*walk.truth, strict=True))
+    stamp_ns, rising = np.unique(stamps_ns, return_index=True)
     carrier = {
         "name": PERSON,
         "tag_id": walk.rounds[0][1].tag_id,
@@ -74,7 +75,7 @@ def load(folder: Path, name: str) -> Recording:
         [carrier],
         walk.rounds,
         imu={PERSON: walk.imu},
-        tracks=[TrueTrack(PERSON, "vive", stamp_ns, table[rising, :3], table[rising, 3:])],
+        tracks=[TrueTrack(PERSON, "vive", stamp_ns, places_m[rising], orientations[rising])],
     )
 
 
@@ -98,4 +99,4 @@ def _take_imu(walk: Walk, at: Instant, message: Any) -> None:
 
 def _take_truth(walk: Walk, at: Instant, message: Any) -> None:
     p, q = message.transform.translation, message.transform.rotation
-    walk.truth.append((at.stamp_ns, p.x, p.y, p.z, q.w, q.x, q.y, q.z))
+    walk.truth.append((at.stamp_ns, (p.x, p.y, p.z), (q.w, q.x, q.y, q.z)))

@@ -103,7 +103,7 @@ def load(folder: Path, name: str) -> Recording:
     vicon = vicon_file(folder, name)
     return Recording(
         name,
-        _site(name, _logs(folder)[name]),
+        _site(_logs(folder)[name]),
         [{"name": PERSON, "tag_id": log.tag + 1, "height_m": 1.75}],
         rounds,
         tracks=[read_vicon(vicon)] if vicon else [],
@@ -115,11 +115,13 @@ def _logs(folder: Path) -> dict[str, Path]:
     found = {path.stem.removeprefix("output_range_uwb_"): path for path in (folder / _LAB).glob("output_range_*.txt")}
     found |= {path.stem.split("_")[0]: path for path in (folder / _HALL).glob("op*_Ranges_*.txt")}
     if not found:
-        raise refused(folder, f"no {_LAB}/output_range_uwb_*.txt", "the folder of positioning-algorithms-for-uwb-matlab")
+        raise refused(
+            folder, f"no {_LAB}/output_range_uwb_*.txt", "the folder of positioning-algorithms-for-uwb-matlab"
+        )
     return found
 
 
-def _site(name: str, path: Path) -> dict[str, object]:
+def _site(path: Path) -> dict[str, object]:
     anchors_m, site, tag_height_m = list(_LAB_ANCHORS_M), "trek_lab", 0.0
     if hall := re.match(r"op\d+_Ranges_(20|40)_20", path.name):
         long_m, z = float(hall[1]), _HALL_HEIGHT_M

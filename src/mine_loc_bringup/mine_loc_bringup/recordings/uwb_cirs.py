@@ -50,7 +50,7 @@ def load(folder: Path, name: str) -> Recording:
     try:
         stamps_ns = START_NS + np.round(unwrapped_s([float(row["rx_time_s"]) for row in placed]) * NS_PER_S).astype(int)
         anchor_id, tag_id = int(placed[0]["anchor"]), int(placed[0]["tag"])
-        anchor_m, tag_m = ([float(placed[0][f"{end}_{axis}"]) for axis in "xy"] for end in ("anchor", "tag"))
+        anchor_m, tag_m = ((float(placed[0][f"{end}_x"]), float(placed[0][f"{end}_y"])) for end in ("anchor", "tag"))
     except ValueError as error:
         raise refused(folder / "frames.csv", error, "numbers") from None
     instants = [Instant(stamp_ns, stamp_ns) for stamp_ns in stamps_ns.tolist()]
@@ -134,7 +134,7 @@ def _window(frames: LabelledFrames, index: int, number: int, ids: tuple[int, int
     )
 
 
-def _at_rest(person: str, place_m: list[float], stamps_ns: Integers) -> TrueTrack:
+def _at_rest(person: str, place_m: tuple[float, float], stamps_ns: Integers) -> TrueTrack:
     stamp_ns = np.arange(stamps_ns[0], stamps_ns[-1] + _TRUTH_PERIOD_NS, _TRUTH_PERIOD_NS)
     position_m = np.tile([*place_m, 0.0], (len(stamp_ns), 1))
     return TrueTrack(person, "map", stamp_ns, position_m, upright(len(stamp_ns)))
