@@ -2,7 +2,8 @@
 
 A trial is NAME.json (who, and marks as sample indices) and NAME_lb.txt.gz: a line on the rate, a heading, then rows of
 packet counter, force X Y Z in m/s², rate X Y Z in rad/s, magnetic field X Y Z in arbitrary units. Sensor X is up, Z
-backwards. Rows of lost packets are missing; the marks count packets.
+backwards (the speed gained in the first second of walking is negative along Z for every subject). Rows of lost packets
+are missing; the marks count packets.
 """
 
 import json
@@ -34,20 +35,27 @@ _UNIT_FIELD_T = 48e-6
 """The sensor's unit is the field where it was calibrated, about this in Western Europe; only the direction counts."""
 _FLU = np.array([-1.0, 1.0, 1.0])  # of the columns Z, Y, X
 _MARKS = "a JSON mapping with Subject, Height, TrialBoundaries, UTurnBoundaries, LeftFootEvents, RightFootEvents"
-_SAMPLES = "rows of packet counter, force, rate and magnetic field: ten numbers"
+_SAMPLES = "rows of seven numbers (packet counter, force, rate), or ten with the magnetic field"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Samples at packet counters (n,), 10 ms each, of which none repeats. Axes are forward-left-up."""
+
+    counter: Integers  # (n,)
+    force_m_s2: Array  # (n, 3)
+    rate_rad_s: Array  # (n, 3)
+    field: Array  # (n, 3), of the unit length that the field had where the sensor was calibrated; NaN = not measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """One trial; instants are packet counters, 10 ms each, of which none repeats. Axes are forward-left-up."""
+    """One trial; instants are packet counters."""
 
     subject: int
     number: int
     height_m: float | None
-    counter: Integers  # (n,)
-    force_m_s2: Array  # (n, 3)
-    rate_rad_s: Array  # (n, 3)
-    field: Array  # (n, 3), of the unit length that the field had where the sensor was calibrated
+    samples: Samples
     begin: int
     turn_begin: int
     turn_end: int
@@ -81,15 +89,11 @@ def read_trial(folder: Path, name: str) -> Trial:
         subject, number, height_cm = int(marks["Subject"]), int(marks["Trial"]), float(marks["Height"])
     except (ValueError, KeyError, TypeError) as error:
         raise refused(path, repr(error), _MARKS) from None
-    table = _table(_data(folder) / f"{name}_lb.txt.gz")
     return Trial(
         subject,
         number,
         None if math.isnan(height_cm) else height_cm / 100.0,
-        table[:, 0].astype(np.int64),
-        table[:, [3, 2, 1]] * _FLU,
-        table[:, [6, 5, 4]] * _FLU,
-        table[:, [9, 8, 7]] * _FLU,
+        read_samples(_data(folder), name),
         int(begin),
         int(turn_begin),
         int(turn_end),
@@ -99,11 +103,25 @@ def read_trial(folder: Path, name: str) -> Trial:
     )
 
 
+def read_samples(data: Path, name: str) -> Samples:
+    """Samples of NAME_lb.txt.gz in `data`. Raises ConfigurationError for a file that is missing or wrong."""
+    path = data / f"{name}_lb.txt.gz"
+    try:
+        table = np.loadtxt(required(path, _SAMPLES), skiprows=2, ndmin=2)
+        table = table[np.unique(table[:, 0], return_index=True)[1]]
+        force, rate = table[:, [3, 2, 1]] * _FLU, table[:, [6, 5, 4]] * _FLU
+    except (OSError, EOFError, ValueError, IndexError) as error:
+        raise refused(path, error, _SAMPLES) from None
+    field = table[:, [9, 8, 7]] * _FLU if table.shape[1] > 9 else np.full_like(force, np.nan)
+    return Samples(table[:, 0].astype(np.int64), force, rate, field)
+
+
 def load(folder: Path, name: str) -> Recording:
     """One trial: samples of the IMU and the marked heel strikes; where the person is, is not known."""
     trial = read_trial(folder, name)
-    stamps_ns = START_NS + trial.counter * PERIOD_NS
-    columns = (stamps_ns, trial.rate_rad_s, trial.force_m_s2, trial.field * _UNIT_FIELD_T)
+    measured = trial.samples
+    stamps_ns = START_NS + measured.counter * PERIOD_NS
+    columns = (stamps_ns, measured.rate_rad_s, measured.force_m_s2, measured.field * _UNIT_FIELD_T)
     rows = zip(*(column.tolist() for column in columns), strict=True)
     samples = [(at_ns, ImuMeasurement(at_ns, tuple(w), tuple(a), tuple(m), None, None)) for at_ns, w, a, m in rows]
     walker = {
@@ -123,11 +141,3 @@ def load(folder: Path, name: str) -> Recording:
 
 def _data(folder: Path) -> Path:
     return folder / "GaitData" if (folder / "GaitData").is_dir() else folder
-
-
-def _table(path: Path) -> Array:
-    try:
-        table = np.loadtxt(required(path, _SAMPLES), skiprows=2, ndmin=2)
-        return np.asarray(table[np.unique(table[:, 0], return_index=True)[1]][:, :10])
-    except (OSError, EOFError, ValueError, IndexError) as error:
-        raise refused(path, error, _SAMPLES) from None
