@@ -1,8 +1,8 @@
 """Turn public recordings into bags with truth, each beside a site folder.
 
 SET is one of the public sets of docs/data.md, which says where to get them; SRC is the folder of the set. Every
-recording becomes OUT/NAME/bag, with the topics of our drivers and truth/<person>/pose, truth/steps or
-truth/link_state, and OUT/NAME/site with site.yaml and people.yaml.
+recording becomes a bag OUT/NAME with the topics of our drivers and truth/<person>/pose, truth/steps or
+truth/link_state; the site folder lies in the bag's (OUT/NAME/site), as mine-loc replay expects it.
 
   trek1000    TREK1000 ranges, laboratory with Vicon truth and sports hall     trek1000_bielefeld
   hanyang     DW1000 ranges of outdoor runs with RTK truth                     hanyang_outdoor_uwb
@@ -13,12 +13,12 @@ truth/link_state, and OUT/NAME/site with site.yaml and people.yaml.
 Examples:
   mine-loc import isas $MINE_LOC_DATA/isas_walk_uwb_imu build/isas
   mine-loc import trek1000 $MINE_LOC_DATA/trek1000_bielefeld build/trek --recording m1l --recording m2r
-  mine-loc replay build/trek/m1l/bag --site build/trek/m1l/site --out build/m1l
+  mine-loc replay build/trek/m1l --out build/m1l
   mine-loc evaluate build/m1l --align rigid --apply-time-offset
 """
 
 import argparse
-import shutil
+import tempfile
 from pathlib import Path
 
 from rich.console import Console
@@ -55,29 +55,28 @@ def run(arguments: argparse.Namespace) -> int:
         for name in wanted:
             messages = _write(importer, arguments.source, name, arguments.out / name, progress)
             progress.advance(whole)
-            print(f"{arguments.out / name / 'bag'}: {messages} messages")
+            print(f"{arguments.out / name}: {messages} messages")
     if importer.alignment:
         print(f"truth is on a clock or in a frame of its own: mine-loc evaluate … {importer.alignment}")
     return 0
 
 
-def _write(importer: Importer, source: Path, name: str, folder: Path, progress: Progress) -> int:
-    """The bag takes its name when it is whole."""
+def _write(importer: Importer, source: Path, name: str, bag: Path, progress: Progress) -> int:
+    """A bag takes its place when it is whole."""
     from mine_loc_bringup.nodes.recording_bag import message_count, write_recording  # noqa: PLC0415 needs ROS
 
-    if (folder / "bag").exists():
-        raise ConfigurationError(f"{folder / 'bag'}: is there already; allowed: a new folder")
+    if bag.exists():
+        raise ConfigurationError(f"{bag}: is there already; allowed: a new folder")
     recording = importer.load(source, name)
-    write_site(recording, importer.source, folder / "site")
-    unfinished = folder / "unfinished"
-    shutil.rmtree(unfinished, ignore_errors=True)
-    unfinished.mkdir()
+    bag.parent.mkdir(parents=True, exist_ok=True)
     task = progress.add_task(name, total=message_count(recording))
     written = 0
-    for written in write_recording(recording, unfinished / "bag"):
-        if written % 256 == 0:
-            progress.update(task, completed=written)
+    with tempfile.TemporaryDirectory(prefix="unfinished_", dir=bag.parent) as folder:
+        unfinished = Path(folder, name)
+        for written in write_recording(recording, unfinished):
+            if written % 256 == 0:
+                progress.update(task, completed=written)
+        write_site(recording, importer.source, unfinished / "site")
+        unfinished.rename(bag)
     progress.remove_task(task)
-    (unfinished / "bag").rename(folder / "bag")
-    unfinished.rmdir()
     return written

@@ -128,7 +128,7 @@ def load(folder: Path, name: str) -> Recording:
         "name": PERSON,
         "tag_id": 0,
         "height_m": trial.height_m or _USUAL_HEIGHT_M,
-        "n100": {"port": "/dev/n100"},
+        "n100": {"port": f"/dev/null/{PERSON}/n100"},
     }
     return Recording(
         name,

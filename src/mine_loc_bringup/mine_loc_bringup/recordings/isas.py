@@ -67,7 +67,7 @@ def load(folder: Path, name: str) -> Recording:
         "name": PERSON,
         "tag_id": walk.rounds[0][1].tag_id,
         "height_m": 1.75,
-        "n100": {"port": "/dev/n100"},
+        "n100": {"port": f"/dev/null/{PERSON}/n100"},
     }
     return Recording(
         name,
