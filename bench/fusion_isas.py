@@ -7,28 +7,26 @@ calibration; every method has its defaults, GTSAM (a chain of points, iSAM2 over
 """
 
 import json
-import os
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import gtsam
 import numpy as np
-from rosbags.highlevel import AnyReader
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.spatial.transform import Rotation
 from uwb_tracks import Array, measurements_of
 
+from mine_loc_bringup.recordings.isas import Walk, read_walk
+from mine_loc_bringup.recordings.public_data import data_file
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_fusion.estimate import EpochInputs
 from mine_loc_fusion.tightly_coupled import TightlyCoupled
 from mine_loc_uwb.fix import FixStatus
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.parameters import UwbSolverParameters
+from mine_loc_uwb.ranging import RangingRound
 from mine_loc_uwb.solvers import RANGE_SOLVERS
 
 GIVEN_SD_M = 0.1
-_BAG = ("isas_walk_uwb_imu", "dataset", "ISAS-Walk1.bag")
 _HEIGHT_M = 1.2
 _SEARCH_S = 1.0
 _GRID_S = 0.05
@@ -38,27 +36,17 @@ _START_M = np.array([2.0, -1.0, _HEIGHT_M])
 
 def read() -> tuple[list[Measurements], Array, Array]:
     """Rounds with valid ranges, instants of truth (m,) and places (m, 3)."""
-    rounds, truth = [], []
-    with AnyReader([Path(os.environ["MINE_LOC_DATA"]).joinpath(*_BAG)]) as reader:
-        for connection, _, raw in reader.messages():
-            if connection.topic not in {"/rtls_flares", "/vive/transform/tracker_1_ref"}:
-                continue
-            message: Any = reader.deserialize(raw, connection.msgtype)
-            time_s = message.header.stamp.sec + message.header.stamp.nanosec / NS_PER_S
-            if connection.topic == "/rtls_flares":
-                rounds.append(_round(time_s, message))
-            else:
-                at = message.transform.translation
-                truth.append((time_s, at.x, at.y, at.z))
-    table = np.array(truth)
-    return [each for each in rounds if len(each)], table[:, 0], table[:, 1:]
+    walk = read_walk(data_file("isas_walk_uwb_imu", "dataset", "ISAS-Walk1.bag"))
+    rounds = [_round(at.stamp_ns / NS_PER_S, ranging, walk) for at, ranging in walk.rounds]
+    truth_s = np.array([stamp_ns for stamp_ns, _, _ in walk.truth]) / NS_PER_S
+    return [each for each in rounds if len(each)], truth_s, np.array([place_m for _, place_m, _ in walk.truth])
 
 
-def _round(time_s: float, message: Any) -> Measurements:
-    valid = [item for item in message.ranges if item.ra]
-    anchors_m = np.array([(item.pos.x, item.pos.y, item.pos.z) for item in valid]).reshape(-1, 3)
-    range_m = np.array([item.range for item in valid], float)
-    return measurements_of(time_s, anchors_m, range_m, sd_m=GIVEN_SD_M, height_m=None, ids=[item.id for item in valid])
+def _round(time_s: float, ranging: RangingRound, walk: Walk) -> Measurements:
+    ranges_m = {item.anchor_id: item.range_m for item in ranging.ranges if np.isfinite(item.range_m)}
+    anchors_m = np.array([walk.anchors_m[anchor] for anchor in ranges_m]).reshape(-1, 3)
+    range_m = np.array(list(ranges_m.values()), float)
+    return measurements_of(time_s, anchors_m, range_m, sd_m=GIVEN_SD_M, height_m=None, ids=list(ranges_m))
 
 
 def plain_least_squares(rounds: list[Measurements]) -> Iterator[tuple[float, Array]]:

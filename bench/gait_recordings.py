@@ -1,10 +1,5 @@
-"""The lower-back recordings of ipol_gait_lowerback as level FLU samples with their marked heel strikes and U-turn.
+"""The lower-back recordings of ipol_gait_lowerback as level FLU samples with their marked heel strikes and U-turn."""
 
-The sensor's X axis points up and its Z axis backwards (the speed gained in the first second of walking is negative
-along Z for every subject), so forward is −Z and left is +Y before levelling.
-"""
-
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from mine_loc_bringup.recordings import ipol
+from mine_loc_bringup.recordings.ipol import WALKED_M
 from mine_loc_sim.gait_constants import SPEED_CHANGE_M_S2
 
 Array = npt.NDArray[np.float64]
 RATE_HZ = 100.0
-WALKED_M = 20.0  # both ways, by the protocol
 STEADY_MARGIN_S = 1.5  # starts, stops and the U-turn's own steps are not steady walking
 
 
@@ -76,32 +72,28 @@ def on_counter_grid(table: Array) -> Array:
 
 def load(folder: Path, name: str) -> Walk:
     """Read trial `name` ("subject-trial")."""
-    meta = json.loads((folder / f"{name}.json").read_text())
-    table = on_counter_grid(np.loadtxt(folder / f"{name}_lb.txt.gz", skiprows=2))
-    flu = [2, 1, 0]
-    sign = np.array([-1.0, 1.0, 1.0])
-    still = slice(20, max(60, meta["TrialBoundaries"][0] - 50))
-    rate = table[:, 4:7] - table[still, 4:7].mean(axis=0)
-    height = float(meta["Height"])
+    trial = ipol.read_trial(folder, name)
+    samples = trial.samples
+    table = on_counter_grid(np.column_stack([samples.counter, samples.force_m_s2, samples.rate_rad_s]))
+    still = slice(20, max(60, trial.begin - 50))
     walk = Walk(
-        subject=int(meta["Subject"]),
-        trial=int(meta["Trial"]),
-        height_m=None if np.isnan(height) else height / 100,
-        specific_force=table[:, 1:4][:, flu] * sign,
-        rate=rate[:, flu] * sign,
-        left_strike=np.array([e for _, e in meta["LeftFootEvents"]], dtype=np.int64),
-        right_strike=np.array([e for _, e in meta["RightFootEvents"]], dtype=np.int64),
-        start=meta["TrialBoundaries"][0],
-        turn_start=meta["UTurnBoundaries"][0],
-        turn_stop=meta["UTurnBoundaries"][1],
-        stop=meta["TrialBoundaries"][1],
+        subject=trial.subject,
+        trial=trial.number,
+        height_m=trial.height_m,
+        specific_force=table[:, 1:4],
+        rate=table[:, 4:7] - table[still, 4:7].mean(axis=0),
+        left_strike=trial.left_strikes,
+        right_strike=trial.right_strikes,
+        start=trial.begin,
+        turn_start=trial.turn_begin,
+        turn_stop=trial.turn_end,
+        stop=trial.end,
     )
     return level(walk)
 
 
 def walks(folder: Path, *, odd_subjects: bool) -> Iterator[Walk]:
     """All trials of the odd subjects (calibration) or of the even ones (scored)."""
-    names = (p.stem for p in folder.glob("*.json"))
-    for name in sorted(names, key=lambda s: [int(part) for part in s.split("-")]):
+    for name in ipol.names(folder):
         if int(name.split("-")[0]) % 2 == int(odd_subjects):
             yield load(folder, name)

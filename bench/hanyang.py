@@ -7,16 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mine_loc_bringup.recordings.hanyang import ANCHORS, read_exchanges, read_truth, run_folder
 from mine_loc_uwb.range_pairs import RangePairs
 from mine_loc_uwb.stamp_latency import TimedRanges
 
-RUNS = {
-    "LOS_A1": "LOS/Trajectory_A/Case_1",
-    "LOS_B3": "LOS/Trajectory_B/Case_3",
-    "NLOS_A1": "NLOS/Trajectory_A/Case_1",
-    "NLOS_B3": "NLOS/Trajectory_B/Case_3",
-}
-ANCHORS = ("A3", "A5", "A9", "A12")
+RUNS = ("LOS_A1", "LOS_B3", "NLOS_A1", "NLOS_B3")
 
 
 def folder() -> Path:
@@ -46,22 +41,15 @@ def static_pairs() -> tuple[RangePairs, int]:
 
 def timed_ranges(run: str) -> TimedRanges:
     """All ranges of a run and its true track."""
-    path = folder() / "Dynamic_measurements" / RUNS[run]
-    rows = []
-    for number, name in enumerate(ANCHORS):
-        with (path / f"{name}.csv").open(newline="") as stream:
-            for row in csv.DictReader(stream):
-                place_m = tuple(float(row[f"field.{axis}"]) for axis in "xyz")
-                rows.append((int(row["field.stamp"]), float(row["field.distanceFromTag"]), number, place_m))
-    with (path / "trajectory.csv").open(newline="") as stream:
-        track = sorted(
-            (int(float(r["timestamp"])), *(float(r[axis]) for axis in "xyz")) for r in csv.DictReader(stream)
-        )
+    path = run_folder(folder(), run)
+    exchanges = read_exchanges(path)
+    numbers = {int(name[1:]): number for number, name in enumerate(ANCHORS)}
+    track_ns, track_m = read_truth(path)
     return TimedRanges(
-        stamp_ns=np.array([row[0] for row in rows], np.int64),
-        range_m=np.array([row[1] for row in rows]),
-        anchor=np.array([row[2] for row in rows], np.int64),
-        anchor_m=np.array([row[3] for row in rows]),
-        track_ns=np.array([row[0] for row in track], np.int64),
-        track_m=np.array([row[1:] for row in track]),
+        stamp_ns=np.array([each.at.stamp_ns for each in exchanges], np.int64),
+        range_m=np.array([each.range_m for each in exchanges]),
+        anchor=np.array([numbers[each.anchor_id] for each in exchanges], np.int64),
+        anchor_m=np.array([each.anchor_m for each in exchanges]),
+        track_ns=track_ns,
+        track_m=track_m,
     )

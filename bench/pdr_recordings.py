@@ -1,6 +1,5 @@
 """The recordings that dead reckoning is scored on, as samples in the order and at the times a device sent them."""
 
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +10,8 @@ import numpy as np
 from gait_recordings import RATE_HZ, Array
 from scipy.io import loadmat
 
-from mine_loc_core.stamps import NS_PER_S, to_ns
+from mine_loc_bringup.recordings.ipol import PERIOD_NS, WALKED_M, names, read_trial
+from mine_loc_core.stamps import to_ns
 
 START_NS = 10**15
 STANDARD_GRAVITY_M_S2 = 9.80665
@@ -40,29 +40,24 @@ def folder(name: str) -> Path:
 
 
 def ipol() -> Iterator[Recording]:
-    """The rows as they came: packets lost stay lost, stamps are packet counters. Sensor X is up, Z backwards.
+    """The rows as they came: packets lost stay lost, stamps are packet counters.
 
     The trial lies between its marked boundaries: after the end people go back as they like, and of those steps only
     some are marked.
     """
     data = folder("ipol_gait_lowerback") / "GaitData"
-    for path in sorted(data.glob("*.json"), key=lambda p: [int(part) for part in p.stem.split("-")]):
-        truth = json.loads(path.read_text())
-        table = np.loadtxt(data / f"{path.stem}_lb.txt.gz", skiprows=2)
-        table = table[np.unique(table[:, 0], return_index=True)[1]]
-        flu = np.array([-1.0, 1.0, 1.0])
-        marks = sorted(end for _, end in truth["LeftFootEvents"] + truth["RightFootEvents"])
-        begin, end = np.array(truth["TrialBoundaries"]) / RATE_HZ
+    for name in names(data):
+        trial = read_trial(data, name)
         yield Recording(
-            path.stem,
-            str(truth["Subject"]),
-            START_NS + (table[:, 0] * NS_PER_S / RATE_HZ).astype(np.int64),
-            table[:, [6, 5, 4]] * flu,
-            table[:, [3, 2, 1]] * flu,
-            np.array(marks) / RATE_HZ,
-            None if np.isnan(float(truth["Height"])) else float(truth["Height"]) / 100,
-            [(begin, end, 20.0)],
-            turn=(truth["UTurnBoundaries"][0] / RATE_HZ, truth["UTurnBoundaries"][1] / RATE_HZ),
+            name,
+            str(trial.subject),
+            START_NS + trial.samples.counter * PERIOD_NS,
+            trial.samples.rate_rad_s,
+            trial.samples.force_m_s2,
+            np.sort(np.concatenate([trial.left_strikes, trial.right_strikes])) / RATE_HZ,
+            trial.height_m,
+            [(trial.begin / RATE_HZ, trial.end / RATE_HZ, WALKED_M)],
+            turn=(trial.turn_begin / RATE_HZ, trial.turn_end / RATE_HZ),
         )
 
 

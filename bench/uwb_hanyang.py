@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 from uwb_solver_grid import candidates
 from uwb_tracks import Array, MakeSolver, Track, measurements_of, run_solver
 
+from mine_loc_bringup.recordings.hanyang import run_folder
 from mine_loc_core.alignment import truth_at
 from mine_loc_uwb.measurements import Measurements
 
@@ -66,7 +67,7 @@ def read(run: str) -> Recorded:
     order, start_ns = np.argsort(ranges.stamp_ns, kind="stable"), int(ranges.track_ns[0])
     authors = {}
     for name, file in (("authors_ls", "LS.csv"), ("authors_eskf", "ESKF.csv")):
-        track = np.loadtxt(folder() / "Dynamic_measurements" / RUNS[run] / file, delimiter=",", skiprows=1)
+        track = np.loadtxt(run_folder(folder(), run) / file, delimiter=",", skiprows=1)
         authors[name] = (track[:, 0] - start_ns) * _NS, track[:, 1:3]
     return Recorded(
         (ranges.stamp_ns[order] - start_ns) * _NS,

@@ -29,7 +29,7 @@ def build_parser(words: Sequence[str]) -> argparse.ArgumentParser:
         "mine-loc", description=_HELP, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     chooser = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    names = {info.name.replace("_", "-"): info.name for info in pkgutil.iter_modules(commands.__path__)}
+    names = {info.name.rstrip("_").replace("_", "-"): info.name for info in pkgutil.iter_modules(commands.__path__)}
     for name in [word for word in words[:1] if word in names] or names:
         module = importlib.import_module(f"{commands.__name__}.{names[name]}")
         text = str(module.__doc__)

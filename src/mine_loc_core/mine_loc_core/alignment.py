@@ -25,6 +25,11 @@ class Alignment:
         """Truth positions (n, 2) in the frame of the track."""
         return truth_m @ _rotation(self.yaw_rad).T + self.shift_m
 
+    def as_json(self) -> dict[str, object]:
+        """Of plain types, the angle in degrees."""
+        yaw_deg, shift_m = float(np.degrees(self.yaw_rad)), self.shift_m.tolist()
+        return {"time_offset_s": self.time_offset_s, "yaw_deg": yaw_deg, "shift_m": shift_m}
+
 
 def rigid_2d(source_m: Array, target_m: Array) -> tuple[float, Array]:
     """Yaw and shift that lay `source_m` (n, 2) over `target_m` (n, 2) with least squared distance."""
@@ -34,8 +39,10 @@ def rigid_2d(source_m: Array, target_m: Array) -> tuple[float, Array]:
     return yaw, target_mean - _rotation(yaw) @ source_mean
 
 
-def align(times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, *, search_s: float) -> Alignment:
-    """The offset within ± `search_s` and the transform with the least RMS distance.
+def align(
+    times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, *, search_s: float, rigid: bool = True
+) -> Alignment:
+    """The offset within ± `search_s` and the transform (none unless `rigid`) with the least RMS distance.
 
     `track_m` is (n, 2) at `times_s`, `truth_m` (m, 2) at `truth_times_s`, which increase. Instants without truth are
     left out; an offset that leaves less than half of them is not considered. Raises ValueError when none is left.
@@ -46,7 +53,7 @@ def align(times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, 
         if inside.sum() < len(times_s) / 2:
             return np.inf, 0.0, np.zeros(2)
         truth = truth_at(times_s[inside] + offset_s, truth_times_s, truth_m)
-        yaw, shift = rigid_2d(truth, track_m[inside])
+        yaw, shift = rigid_2d(truth, track_m[inside]) if rigid else (0.0, np.zeros(2))
         residual = track_m[inside] - (truth @ _rotation(yaw).T + shift)
         return float(np.sqrt(np.mean(np.sum(residual**2, axis=1)))), yaw, shift
 
@@ -55,8 +62,11 @@ def align(times_s: Array, track_m: Array, truth_times_s: Array, truth_m: Array, 
     coarse_s = float(grid[np.argmin([fit(offset)[0] for offset in grid])])
     if not np.isfinite(fit(coarse_s)[0]):
         raise ValueError(f"truth covers less than half of the track at every time offset within ± {search_s:g} s")
-    bounds = (max(coarse_s - step_s, -search_s), min(coarse_s + step_s, search_s))
-    offset_s = float(minimize_scalar(lambda offset: fit(offset)[0], bounds=bounds, method="bounded").x)
+    low_s, high_s = max(coarse_s - step_s, -search_s), min(coarse_s + step_s, search_s)
+    offset_s = coarse_s
+    if high_s > low_s:
+        found = minimize_scalar(lambda offset: fit(offset)[0], bounds=(low_s, high_s), method="bounded")
+        offset_s = float(found.x)
     _, yaw, shift = fit(offset_s)
     return Alignment(offset_s, yaw, shift)
 

@@ -63,3 +63,20 @@ def test_truth_at_an_instant_is_interpolated_and_unknown_outside():
     found = truth_at(np.array([-1.0, 0.5, 3.0]), np.array([0.0, 1.0]), np.array([[0.0, 2.0], [1.0, 4.0]]))
     assert found[1] == pytest.approx([0.5, 3.0])
     assert np.isnan(found[[0, 2]]).all()
+
+
+def test_without_a_transform_the_offset_alone_is_found():
+    times_s = np.arange(5.0, 35.0, 0.1)
+    found = align(
+        times_s, walk(times_s + 0.4) + np.array([0.3, 0.0]), TRUTH_S, walk(TRUTH_S), search_s=2.0, rigid=False
+    )
+    assert (found.yaw_rad, found.shift_m.tolist()) == (0.0, [0.0, 0.0])
+    assert found.time_offset_s == pytest.approx(0.4, abs=0.15)
+
+
+def test_without_a_search_the_transform_alone_is_found():
+    times_s = np.arange(5.0, 35.0, 0.1)
+    turned = Alignment(0.0, 0.7, np.array([1.0, 2.0]))
+    found = align(times_s, turned.apply(walk(times_s)), TRUTH_S, walk(TRUTH_S), search_s=0.0)
+    assert found.time_offset_s == 0.0
+    assert found.yaw_rad == pytest.approx(0.7, abs=1e-4)

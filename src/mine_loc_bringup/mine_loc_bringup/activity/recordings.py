@@ -1,7 +1,7 @@
 """Labelled windows of recordings like ipol_gait_lowerback: stand, walk, U-turn, walk back, stop.
 
-A recording is NAME.json (Subject, TrialBoundaries, UTurnBoundaries as sample indices) and NAME_lb.txt.gz: a line on the
-rate, a heading, then rows of packet counter, force X Y Z in m/s², rate X Y Z in rad/s. Sensor X is up, Z backwards.
+A recording is NAME.json (Subject, TrialBoundaries, UTurnBoundaries as sample indices) and NAME_lb.txt.gz, see
+`recordings/ipol.py`.
 """
 
 import json
@@ -9,17 +9,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mine_loc_bringup.activity.windows import windows_of
+from mine_loc_bringup.recordings.ipol import PERIOD_NS, read_samples
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_pdr.activity_labels import LabelledWindow, MarkedWalk, label_marked
 from mine_loc_pdr.activity_window import BIN_NS, WINDOW_NS
 
-_PERIOD_NS = 10 * NS_PER_MS
 _START_NS = 10**15
-_FLU = np.array([-1.0, 1.0, 1.0])  # of the columns Z, Y, X
 
 
 def recording_names(folder: Path) -> list[str]:
@@ -36,7 +32,7 @@ def marks(folder: Path, name: str) -> tuple[str, MarkedWalk]:
     try:
         truth: dict[str, Any] = json.loads(path.read_text("utf-8"))
         (begin, end), (turn_begin, turn_end) = truth["TrialBoundaries"], truth["UTurnBoundaries"]
-        instants = [_START_NS + int(each) * _PERIOD_NS for each in (begin, turn_begin, turn_end, end)]
+        instants = [_START_NS + int(each) * PERIOD_NS for each in (begin, turn_begin, turn_end, end)]
         return f"recorded {truth['Subject']}", MarkedWalk(*instants)
     except (ValueError, KeyError, TypeError) as error:
         raise ConfigurationError(f"{path}: {error!r}; allowed: Subject, TrialBoundaries, UTurnBoundaries") from None
@@ -45,13 +41,9 @@ def marks(folder: Path, name: str) -> tuple[str, MarkedWalk]:
 def recorded_windows(folder: Path, name: str) -> Iterator[LabelledWindow]:
     """Every window of a recording; place 0 is the first that begins within the walk."""
     person, walk = marks(folder, name)
-    try:
-        table = np.loadtxt(folder / f"{name}_lb.txt.gz", skiprows=2)
-        table = table[np.unique(table[:, 0], return_index=True)[1]]
-        stamps_ns = _START_NS + table[:, 0].astype(np.int64) * _PERIOD_NS
-        windows = list(windows_of(stamps_ns, table[:, [6, 5, 4]] * _FLU, table[:, [3, 2, 1]] * _FLU))
-    except (OSError, ValueError, IndexError) as error:
-        raise ConfigurationError(f"{folder / name}_lb.txt.gz: {error}; allowed: rows of seven numbers") from None
+    samples = read_samples(folder, name)
+    stamps_ns = _START_NS + samples.counter * PERIOD_NS
+    windows = list(windows_of(stamps_ns, samples.rate_rad_s, samples.force_m_s2))
     first_bin = -(-walk.begin_ns // BIN_NS)
     for window in windows:
         begin_ns = window.end_ns - WINDOW_NS

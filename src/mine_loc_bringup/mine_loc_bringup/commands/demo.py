@@ -29,10 +29,12 @@ from rich.table import Table
 
 from mine_loc_bringup.console import Console
 from mine_loc_bringup.demo import generated, isas_walk, trek_lab
-from mine_loc_bringup.demo.recording import DATA_VARIABLE, Recording
-from mine_loc_bringup.demo.report import PersonReport, Track, person_report, plot, together
+from mine_loc_bringup.demo.playback import Playback
+from mine_loc_bringup.demo.report import PersonReport, person_report, plot, together
 from mine_loc_bringup.demo.table import people_table
+from mine_loc_bringup.evaluation.track import Track
 from mine_loc_bringup.graph import expand, node_environment
+from mine_loc_bringup.recordings.public_data import DATA_VARIABLE
 from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.errors import ConfigurationError
@@ -40,7 +42,7 @@ from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import Site, load_site
 from mine_loc_sim.serial_lines import Player, PseudoSerial
 
-_RECORDINGS: dict[str, Callable[[], Recording]] = {
+_RECORDINGS: dict[str, Callable[[], Playback]] = {
     "m1l": trek_lab.load,
     "isas_walk1": isas_walk.load,
 }
@@ -72,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     return asyncio.run(demo.run())
 
 
-def _recording(arguments: argparse.Namespace) -> Recording:
+def _recording(arguments: argparse.Namespace) -> Playback:
     name = arguments.recording
     if arguments.site and name not in {"", _SIMULATED}:
         raise ConfigurationError(
@@ -88,7 +90,7 @@ def _recording(arguments: argparse.Namespace) -> Recording:
 
 
 class _Demo:
-    def __init__(self, recording: Recording, arguments: argparse.Namespace) -> None:
+    def __init__(self, recording: Playback, arguments: argparse.Namespace) -> None:
         self._recording = recording
         self._seconds = arguments.seconds
         self._out: Path = arguments.out.resolve()
@@ -182,14 +184,14 @@ class _Demo:
 
     def _track(self, person: str) -> Track:
         outputs = [o for o in self._watch.watched.outputs.get(person, []) if o.received_ns >= self._started_ns]
-        seconds = [((o.stamp_ns - self._started_ns) / 1e9, (o.received_ns - self._started_ns) / 1e9) for o in outputs]
-        times = np.array(seconds, dtype=np.float64).reshape(-1, 2)
+        covariance = [((xx, xy), (xy, yy)) for xx, xy, yy in (o.covariance_m2 for o in outputs)]
         return Track(
-            times[:, 0],
-            times[:, 1],
-            np.array([(o.x_m, o.y_m) for o in outputs], dtype=np.float64).reshape(-1, 2),
-            np.array([o.ce95_m for o in outputs]),
-            np.array([o.mode for o in outputs], dtype=np.int64),
+            stamp_ns=np.array([o.stamp_ns for o in outputs], np.int64),
+            logged_ns=np.array([o.received_ns for o in outputs], np.int64),
+            position_m=np.array([(o.x_m, o.y_m) for o in outputs], np.float64).reshape(-1, 2),
+            covariance_m2=np.array(covariance, np.float64).reshape(-1, 2, 2),
+            ce95_m=np.array([o.ce95_m for o in outputs], np.float64),
+            modes=np.array([o.mode for o in outputs], np.int64),
         )
 
     def _report(self, site: Site, supervisor: Supervisor) -> int:
@@ -197,7 +199,9 @@ class _Demo:
         missing: list[str] = []
         for truth in self._recording.truths:
             try:
-                reports.append(person_report(truth.person, self._track(truth.person), truth, self._ends_s))
+                reports.append(
+                    person_report(truth.person, self._track(truth.person), truth, self._started_ns, self._ends_s)
+                )
             except ValueError as error:
                 missing.append(str(error))
         receivers = {receiver.name for receiver in site.uwb_receivers}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mine_loc_bringup.demo.recording import Recording, Truth
+from mine_loc_bringup.demo.playback import Playback, Truth
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_S, to_ns
@@ -17,7 +17,7 @@ _TRUTH_RATE_HZ = 20
 _MARGIN_NS = NS_PER_S  # stamps of the first and last outputs may lie a little outside
 
 
-def load(folder: Path, people: int, seconds: float, seed: int) -> Recording:
+def load(folder: Path, people: int, seconds: float, seed: int) -> Playback:
     """Simulate `people` at a site; the bytes are made while they are played, the truth is there at once.
 
     Raises ConfigurationError for a site that cannot be simulated.
@@ -34,4 +34,4 @@ def load(folder: Path, people: int, seconds: float, seed: int) -> Recording:
         )
         for person in taking_part
     ]
-    return Recording(f"simulated {site.name}, seed {seed}", str(folder.resolve()), lines, seconds, truths, taking_part)
+    return Playback(f"simulated {site.name}, seed {seed}", str(folder.resolve()), lines, seconds, truths, taking_part)

@@ -35,7 +35,7 @@ def read_recording(path: Path) -> LabelledFrames:
 
 def read_folder(path: Path) -> LabelledFrames:
     """Read `cir_iq.npz` (key cir: int16 (n, taps, 2)) and `frames.csv`, as uwb_cirs_2018."""
-    rows, columns = _read_csv(path / "frames.csv")
+    rows, columns = read_rows(path / "frames.csv")
     missing = [name for name in _REQUIRED if name not in columns]
     if missing:
         raise ConfigurationError(
@@ -63,7 +63,7 @@ def read_folder(path: Path) -> LabelledFrames:
 
 def read_ewine(path: Path) -> LabelledFrames:
     """Read header columns NLOS, RANGE, FP_IDX, RXPACC and on, then magnitudes CIR0 and on: every frame a placement."""
-    rows, columns = _read_csv(path)
+    rows, columns = read_rows(path)
     names = list(itertools.takewhile(columns.__contains__, (f"CIR{number}" for number in range(1016))))
     missing = [name for name in ("NLOS", "FP_IDX", "CIR0") if name not in columns]
     if missing:
@@ -88,7 +88,8 @@ def read_ewine(path: Path) -> LabelledFrames:
     return LabelledFrames(frames, allowed_classes(labels), number, number.tolist(), number * _FRAME_PERIOD_NS)
 
 
-def _read_csv(path: Path) -> tuple[list[dict[str, str]], set[str]]:
+def read_rows(path: Path) -> tuple[list[dict[str, str]], set[str]]:
+    """Rows of a CSV and its columns. Raises ConfigurationError for a file of none or too many."""
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
         rows = list(itertools.islice(reader, _MOST_FRAMES + 1))

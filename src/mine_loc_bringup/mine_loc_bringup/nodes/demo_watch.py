@@ -33,6 +33,7 @@ class Output:
     stamp_ns: int
     x_m: float
     y_m: float
+    covariance_m2: tuple[float, float, float]  # xx, xy, yy
     ce95_m: float
     mode: int
     los_fraction: float
@@ -105,6 +106,7 @@ class DemoWatch:
                 to_stamp_ns(person.stamp),
                 position.x,
                 position.y,
+                tuple(person.pose.covariance[[0, 1, 7]]),
                 person.horizontal_ce95,
                 person.mode,
                 person.los_fraction,

@@ -24,6 +24,8 @@ _BATCH = 1024
 def read_bag(path: Path) -> LabelledFrames:
     """Read frames whose link has a label within 50 ms; every link of tag and anchor is a placement.
 
+    A label allows the classes to which it gives any probability.
+
     Raises ConfigurationError for a bag without frames or labels, or with windows of different widths.
     """
     labels = _labels(path)
@@ -45,7 +47,7 @@ def read_bag(path: Path) -> LabelledFrames:
     numbers = {link: number for number, link in enumerate(dict.fromkeys(links))}
     return LabelledFrames(
         frames=concatenate([to_cir_frames(kept[first : first + _BATCH]) for first in range(0, len(kept), _BATCH)]),
-        allowed=np.array(classes)[:, None] == np.arange(1, 5),
+        allowed=np.array(classes)[:, None] >> np.arange(4) & 1 > 0,
         placement=np.array([numbers[link] for link in links]),
         links=links,
         stamp_ns=np.array([to_stamp_ns(message.header.stamp) for message in kept]),
@@ -53,18 +55,19 @@ def read_bag(path: Path) -> LabelledFrames:
 
 
 def _labels(path: Path) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
-    """Stamps and classes of each link, in order of time."""
+    """Stamps and allowed classes (a bit each) of each link, in order of time."""
     found: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for message in _messages(path, _LABELS, LinkState):
         if message.most_likely_class:
-            row = (to_stamp_ns(message.header.stamp), message.most_likely_class)
+            allowed = sum(1 << bit for bit, share in enumerate(message.class_probability) if share > 0.0)
+            row = (to_stamp_ns(message.header.stamp), allowed)
             found.setdefault((message.tag_id, message.anchor_id), []).append(row)
     columns = {link: np.array(sorted(rows)) for link, rows in found.items()}
     return {link: (rows[:, 0], rows[:, 1]) for link, rows in columns.items()}
 
 
 def _nearest(known: tuple[np.ndarray, np.ndarray] | None, stamp_ns: int) -> int:
-    """Class of the label nearest in time, 0 = none is near."""
+    """Allowed classes of the label nearest in time, 0 = none is near."""
     if known is None:
         return 0
     stamps, classes = known

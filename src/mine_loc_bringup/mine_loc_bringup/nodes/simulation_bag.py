@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
-from mine_loc_interfaces.msg import CirFrame, LinkState, Step, TdoaArray, UwbRangeArray
+from mine_loc_interfaces.msg import CirFrame, TdoaArray, UwbRangeArray
 from rclpy.serialization import serialize_message
 
 from mine_loc_bringup.bag_writer import BagWriter
+from mine_loc_bringup.nodes.truth_messages import to_true_link, to_true_pose, to_true_step
 from mine_loc_coarse.bearing_stream import BearingStream
 from mine_loc_coarse.nodes.messages import to_bearing_arrays
 from mine_loc_coarse.parameters import MonitorDriverParameters
 from mine_loc_core.device_clock import DeviceClock
-from mine_loc_core.nodes.conversions import to_point, to_time
 from mine_loc_core.people import Person
 from mine_loc_core.site import UwbReceiver
 from mine_loc_core.stamps import NS_PER_S
@@ -140,32 +139,23 @@ def _truth_poses(scenario: Scenario, start_ns: int, stop_ns: int) -> Iterator[En
         pose = scenario.pose(person.name, stamps)
         rows = zip(stamps.tolist(), pose.position_m.tolist(), pose.orientation_wxyz.tolist(), strict=True)
         for stamp_ns, position_m, (w, x, y, z) in rows:
-            message = PoseStamped()
-            message.header.stamp = to_time(START_NS + stamp_ns)
-            message.header.frame_id = scenario.site.map_frame
-            message.pose.position = to_point(position_m)
-            q = message.pose.orientation
-            q.w, q.x, q.y, q.z = w, x, y, z
+            message = to_true_pose(START_NS + stamp_ns, scenario.site.map_frame, position_m, (w, x, y, z))
             yield stamp_ns, f"truth/{person.name}/pose", message
 
 
 def _truth_step(person: str, step: TrueStep) -> Entry:
-    message = Step(person=person, length=step.length_m, heading=step.heading_rad, confidence=1.0, interval=float("nan"))
-    message.header.stamp = to_time(START_NS + step.stamp_ns)
-    message.header.frame_id = "map"
-    message.position = to_point(step.position_m)
+    message = to_true_step(
+        person,
+        START_NS + step.stamp_ns,
+        length_m=step.length_m,
+        heading_rad=step.heading_rad,
+        position_m=step.position_m,
+    )
     return step.stamp_ns, "truth/steps", message
 
 
 def _truth_link(scenario: Scenario, link: TrueLink) -> Entry:
     person = next(each for each in scenario.people if each.name == link.person)
-    likelihood = [float(link.link_class == each) for each in range(1, 5)]
-    message = LinkState(
-        tag_id=person.tag_id,
-        anchor_id=link.anchor_id,
-        most_likely_class=link.link_class,
-        class_probability=likelihood,
-        los_probability=likelihood[2] + likelihood[3],
-    )
-    message.header.stamp = to_time(START_NS + link.stamp_ns)
+    allowed = [link.link_class == each for each in range(1, 5)]
+    message = to_true_link(START_NS + link.stamp_ns, person.tag_id, link.anchor_id, allowed)
     return link.stamp_ns, "truth/link_state", message

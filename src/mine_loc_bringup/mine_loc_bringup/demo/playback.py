@@ -1,19 +1,15 @@
 """What the demonstration plays: bytes for serial lines, and the truth to report against."""
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import Person
 from mine_loc_sim.timed_bytes import Arrival
 
 Array = npt.NDArray[np.float64]
-DATA_VARIABLE = "MINE_LOC_DATA"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +24,7 @@ class Truth:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class Playback:
     """A recording ready to be played, once.
 
     `site` names the folder under config/ that describes the place, or is a path of its own; `lines` maps `receiver` or
@@ -42,14 +38,3 @@ class Recording:
     lasts_s: float
     truths: Sequence[Truth]
     people: Sequence[Person] | None = None
-
-
-def data_file(*parts: str) -> Path:
-    """A file of the public recordings. Raises ConfigurationError when they are not here."""
-    folder = os.environ.get(DATA_VARIABLE, "")
-    path = Path(folder, *parts)
-    if not folder or not path.exists():
-        raise ConfigurationError(
-            f"{DATA_VARIABLE}={folder!r}: {Path(*parts)} is not there; allowed: the folder of public recordings"
-        )
-    return path

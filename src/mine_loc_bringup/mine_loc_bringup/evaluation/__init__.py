@@ -1,0 +1,1 @@
+"""How good an output was: measures against truth, bounds on them, and reports."""
