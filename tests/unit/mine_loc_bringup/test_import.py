@@ -98,7 +98,7 @@ def test_nothing_is_left_of_an_import_that_fails_and_nothing_is_written_over(tmp
         ("trek1000", "output_range_uwb"),
         ("hanyang", "Dynamic_measurements/LOS"),
         ("isas", "ISAS-Walk"),
-        ("ipol", "NAME_lb.txt.gz"),
+        ("ipol", "NAME_lb.txt"),
         ("uwb-cirs", "frames.csv"),
     ],
 )

@@ -18,13 +18,12 @@ Examples:
 """
 
 import argparse
-import tempfile
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from mine_loc_bringup.recordings.importers import IMPORTERS, Importer, write_site
+from mine_loc_bringup.recordings.importers import IMPORTERS, Importer
 from mine_loc_core.errors import ConfigurationError
 
 
@@ -62,21 +61,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(importer: Importer, source: Path, name: str, bag: Path, progress: Progress) -> int:
-    """A bag takes its place when it is whole."""
     from mine_loc_bringup.nodes.recording_bag import message_count, write_recording  # noqa: PLC0415 needs ROS
 
-    if bag.exists():
-        raise ConfigurationError(f"{bag}: is there already; allowed: a new folder")
     recording = importer.load(source, name)
-    bag.parent.mkdir(parents=True, exist_ok=True)
     task = progress.add_task(name, total=message_count(recording))
     written = 0
-    with tempfile.TemporaryDirectory(prefix="unfinished_", dir=bag.parent) as folder:
-        unfinished = Path(folder, name)
-        for written in write_recording(recording, unfinished):
-            if written % 256 == 0:
-                progress.update(task, completed=written)
-        write_site(recording, importer.source, unfinished / "site")
-        unfinished.rename(bag)
+    for written in write_recording(recording, importer.source, bag):
+        if written % 256 == 0:
+            progress.update(task, completed=written)
     progress.remove_task(task)
     return written

@@ -2,6 +2,7 @@
 
 import heapq
 import math
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,9 @@ from rclpy.serialization import serialize_message
 from mine_loc_bringup.bag_writer import BagWriter
 from mine_loc_bringup.nodes.truth_messages import to_true_link, to_true_pose, to_true_step
 from mine_loc_bringup.recordings.recording import Instant, Recording
+from mine_loc_bringup.recordings.site_files import write_site
 from mine_loc_core.device_clock import DeviceStamp, SyncState
+from mine_loc_core.errors import ConfigurationError
 from mine_loc_pdr.nodes.messages import Covariances, to_header, to_imu, to_magnetic_field
 from mine_loc_pdr.parameters import N100DriverParameters
 from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array
@@ -22,8 +25,23 @@ _NS_PER_TICK = 1.0  # `Range.ticks_offset` of a recording
 Entry = tuple[int, str, Any]
 
 
-def write_recording(recording: Recording, path: Path) -> Iterator[int]:
-    """Write a new bag whose messages are logged on arrival; yields after each message how many there are."""
+def write_recording(recording: Recording, source: str, bag: Path) -> Iterator[int]:
+    """Write a new bag with its site folder, which takes its place when it is whole; `source`: where it comes from.
+
+    Messages are logged on arrival; yields after each how many there are. Raises ConfigurationError where `bag` is
+    there already, and for a recording that no site file can describe.
+    """
+    if bag.exists():
+        raise ConfigurationError(f"{bag}: is there already; allowed: a new folder")
+    bag.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="unfinished_", dir=bag.parent) as folder:
+        unfinished = Path(folder, bag.name)
+        yield from _write_messages(recording, unfinished)
+        write_site(recording, source, unfinished / "site")
+        unfinished.rename(bag)
+
+
+def _write_messages(recording: Recording, path: Path) -> Iterator[int]:
     writer = BagWriter(path)
     try:
         streams = [_rounds(recording), _accumulators(recording), *_imu(recording), *_truth(recording)]

@@ -1,15 +1,11 @@
-"""The public recordings that `mine-loc import` knows, and what is written of each but the bag: the site folder."""
+"""The public recordings that `mine-loc import` knows."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from mine_loc_bringup.recordings import hanyang, ipol, isas, trek1000, uwb_cirs
 from mine_loc_bringup.recordings.recording import Recording
-from mine_loc_core.people import load_people
-from mine_loc_core.site import load_site
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +33,3 @@ IMPORTERS: Mapping[str, Importer] = {
     "ipol": Importer("https://github.com/CyrilVoisard/ipol_dataset_1", ipol.names, ipol.load),
     "uwb-cirs": Importer("https://github.com/marckolak/uwb-cirs-2018", uwb_cirs.names, uwb_cirs.load),
 }
-
-
-def write_site(recording: Recording, source: str, folder: Path) -> None:
-    """Write site.yaml and people.yaml of a recording, and read them back: what is wrong shows here, not in a replay."""
-    folder.mkdir(parents=True, exist_ok=True)
-    heading = f"# Of the recording {recording.name}, published at {source}; lines of devices are not used.\n"
-    for name, content in (("site", recording.site), ("people", {"schema": 1, "people": list(recording.people)})):
-        text = heading + yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-        (folder / f"{name}.yaml").write_text(text, "utf-8")
-    load_site(folder)
-    load_people(folder)

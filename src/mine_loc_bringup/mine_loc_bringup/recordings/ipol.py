@@ -1,9 +1,9 @@
 """ipol_gait_lowerback (Voisard et al., IPOL 2023): people with an IMU at the lower back walk there and back.
 
-A trial is NAME.json (who, and marks as sample indices) and NAME_lb.txt.gz: a line on the rate, a heading, then rows of
-packet counter, force X Y Z in m/s², rate X Y Z in rad/s, magnetic field X Y Z in arbitrary units. Sensor X is up, Z
-backwards (the speed gained in the first second of walking is negative along Z for every subject). Rows of lost packets
-are missing; the marks count packets.
+A trial is NAME.json (who, and marks as sample indices) and NAME_lb.txt, packed as .gz or not: a line on the rate, a
+heading, then rows of packet counter, force X Y Z in m/s², rate X Y Z in rad/s, magnetic field X Y Z in arbitrary units.
+Sensor X is up, Z backwards (the speed gained in the first second of walking is negative along Z for every subject).
+Rows of lost packets are missing; the marks count packets.
 """
 
 import json
@@ -73,7 +73,7 @@ class Trial:
 def names(folder: Path) -> list[str]:
     """Of all trials, `subject-trial`, by number. Raises ConfigurationError if there are none."""
     data = _data(folder)
-    found = [path.stem for path in data.glob("*-*.json") if (data / f"{path.stem}_lb.txt.gz").is_file()]
+    found = [path.stem for path in data.glob("*-*.json") if any(data.glob(f"{path.stem}_lb.txt*"))]
     if not found:
         raise refused(data, "no trials", "a folder of NAME.json with NAME_lb.txt.gz")
     return sorted(found, key=lambda name: [int(part) if part.isdigit() else 0 for part in name.split("-")])
@@ -104,8 +104,9 @@ def read_trial(folder: Path, name: str) -> Trial:
 
 
 def read_samples(data: Path, name: str) -> Samples:
-    """Samples of NAME_lb.txt.gz in `data`. Raises ConfigurationError for a file that is missing or wrong."""
-    path = data / f"{name}_lb.txt.gz"
+    """Samples of a trial in `data`. Raises ConfigurationError for a file that is missing or wrong."""
+    packed, plain = (data / f"{name}_lb.txt{ending}" for ending in (".gz", ""))
+    path = plain if plain.is_file() and not packed.is_file() else packed
     try:
         table = np.loadtxt(required(path, _SAMPLES), skiprows=2, ndmin=2)
         table = table[np.unique(table[:, 0], return_index=True)[1]]
