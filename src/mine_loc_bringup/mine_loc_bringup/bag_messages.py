@@ -1,5 +1,6 @@
 """Messages of a bag, of any rosbag2 or ROS 1 recorder, in the order recorded and in our definitions."""
 
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,6 +13,19 @@ from rosbags.interfaces import Connection
 from mine_loc_bringup.message_types import workspace_types
 from mine_loc_bringup.topic_mapping import TopicMapping, adapt
 from mine_loc_core.errors import ConfigurationError
+
+BROKEN = (
+    AnyReaderError,
+    OSError,
+    ValueError,
+    LookupError,
+    AttributeError,
+    TypeError,
+    EOFError,
+    AssertionError,
+    struct.error,
+)
+"""What the reader of rosbags raises on files that are broken off or are no bags."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +66,7 @@ class BagMessages:
             for connection, log_ns, raw in self._reader.messages(chosen) if chosen else ():
                 topic, name = targets[connection.id]
                 yield BagMessage(log_ns, topic, name, convert[connection.id](raw, log_ns))
-        except (AnyReaderError, OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+        except BROKEN as error:
             raise ConfigurationError(f"{self._bag}: cannot be read on: {error}; allowed: a whole bag") from error
 
     def _converter(self, connection: Connection, name: str) -> Callable[[bytes, int], bytes]:
@@ -77,7 +91,7 @@ def open_bag(bag: Path, mapping: TopicMapping | None = None) -> Iterator[BagMess
     try:
         reader = AnyReader([bag], default_typestore=workspace_types())
         reader.open()
-    except (AnyReaderError, OSError, ValueError, KeyError, AssertionError) as error:
+    except BROKEN as error:
         reason = str(error) or type(error).__name__
         raise ConfigurationError(
             f"{bag}: {reason}; allowed: a folder of rosbag2 or a .bag file (mine-loc bag repair mends a broken one)"

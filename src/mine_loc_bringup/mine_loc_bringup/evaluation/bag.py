@@ -1,20 +1,18 @@
-"""Outputs, truth, verdicts and steps from a bag, by the names of `docs/topics.md`; bags are read by field name."""
+"""Outputs, truth, verdicts and steps from a bag, by the names of `docs/topics.md`."""
 
 import functools
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from struct import error
 from typing import Any
 
 import numpy as np
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.interfaces import Connection
 
+from mine_loc_bringup.bag_messages import BagMessages, open_bag
 from mine_loc_bringup.evaluation.track import Array, Integers, StepCount, Track, Truth
+from mine_loc_bringup.message_types import workspace_types
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_core.verdicts import Reason, Source
@@ -75,9 +73,9 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
     columns: dict[str, _Columns] = {}
     steps: dict[str, dict[str, list[int]]] = {_STEPS: {}, _TRUE_STEPS: {}}
     first_ns, last_ns = 2**62, 0
-    with _opened(bag) as reader:
-        _check_topics(bag, {each.topic: each.msgtype for each in reader.connections})
-        for topic, logged_ns, read in _messages(bag, reader, progress):
+    with open_bag(bag) as messages:
+        _check_topics(bag, messages.topics)
+        for topic, logged_ns, read in _messages(messages, set(messages.topics), progress):
             if not topic.startswith("/truth/"):
                 first_ns, last_ns = min(first_ns, logged_ns), max(last_ns, logged_ns)
             if topic == POSES:
@@ -103,9 +101,9 @@ def read_truth(bag: Path, pattern: str, people: list[str], progress: Progress | 
     """
     rows: dict[str, list[tuple[int, float, float]]] = {}
     frames: dict[str, str] = {}
-    with _opened(bag) as reader:
-        person_of = _people_of(pattern, sorted({each.topic for each in reader.connections}), people)
-        for topic, _, read in _messages(bag, reader, progress, set(person_of)):
+    with open_bag(bag) as messages:
+        person_of = _people_of(pattern, sorted(messages.topics), people)
+        for topic, _, read in _messages(messages, set(person_of), progress):
             message = read()
             stamp_ns, place = _ns(message.header.stamp), _place(message, f"{bag}: {topic}")
             rows.setdefault(person_of[topic], []).append((stamp_ns, float(place.x), float(place.y)))
@@ -182,48 +180,12 @@ def _ns(stamp: Any) -> int:
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
-@contextmanager
-def _opened(bag: Path) -> Iterator[AnyReader]:
-    with _refusing(bag):
-        reader = AnyReader([bag])
-        reader.open()
-    try:
-        yield reader
-    finally:
-        reader.close()
-
-
-@contextmanager
-def _refusing(bag: Path) -> Iterator[None]:
-    """The reader answers broken files with errors of many kinds."""
-    try:
-        yield
-    except (AnyReaderError, OSError, ValueError, LookupError, TypeError, EOFError, AssertionError, error) as problem:
-        reason = str(problem) or type(problem).__name__
-        raise ConfigurationError(f"{bag}: cannot be read as a bag: {reason}; allowed: a rosbag2 folder") from problem
-
-
 def _messages(
-    bag: Path, reader: AnyReader, progress: Progress | None, topics: set[str] | None = None
+    messages: BagMessages, wanted: set[str], progress: Progress | None
 ) -> Iterator[tuple[str, int, Callable[[], Any]]]:
     """Topic, log time and a way to read each message; `progress` hears which share of the bag is done."""
-    wanted = [each for each in reader.connections if topics is None or each.topic in topics]
-    if not wanted:  # rosbags takes none for all
-        return
-    count, number = max(sum(each.msgcount for each in wanted), 1), 0
-    stream = reader.messages(wanted)
-    while True:
-        with _refusing(bag):
-            found = next(stream, None)
-        if found is None:
-            return
-        connection, logged_ns, raw = found
-        number += 1
+    types = workspace_types()
+    for number, each in enumerate(messages.read(wanted)):
         if progress and number % 500 == 0:
-            progress(number / count)
-        yield connection.topic, logged_ns, functools.partial(_read, bag, reader, connection, raw)
-
-
-def _read(bag: Path, reader: AnyReader, connection: Connection, raw: bytes) -> Any:
-    with _refusing(bag):
-        return reader.deserialize(raw, connection.msgtype)
+            progress((each.log_ns - messages.start_ns) / max(messages.end_ns - messages.start_ns, 1))
+        yield each.topic, each.log_ns, functools.partial(types.deserialize_cdr, each.data, each.type_name)
