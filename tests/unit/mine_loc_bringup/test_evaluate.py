@@ -189,6 +189,16 @@ def test_steps_alone_are_evaluated_without_poses(tmp_path):
     assert one["horizontal_mean_m"] is None
 
 
+def test_outputs_are_due_from_the_first_measurement_on(tmp_path):
+    late = lambda times_s: times_s >= 10.0  # noqa: E731
+    unmeasured = write_bag(tmp_path / "bag", keep=late)
+    assert figures(tmp_path, str(unmeasured))["people"]["ann"]["availability"] == pytest.approx(1.0, abs=0.01)
+    measured = write_bag(tmp_path / "measured", keep=late, steps=[0.0])
+    one = figures(tmp_path, str(measured))["people"]["ann"]
+    assert one["availability"] == pytest.approx(0.5, abs=0.01)
+    assert one["first_output_s"] == pytest.approx(10.02)
+
+
 def test_an_sqlite_bag_of_another_writer_reads_the_same(tmp_path):
     bag = write_bag(tmp_path / "bag", error_m=off(0.3, 0.4))
     with (

@@ -22,6 +22,9 @@ TRUTH = "truth/<person>/pose"
 PLACEHOLDER = "<person>"
 _VERDICTS = {"/fused/verdicts": "fused", "/uwb/verdicts": "uwb"}
 _STEPS, _TRUE_STEPS = "/pdr/steps", "/truth/steps"
+_MEASURED = {"/uwb/ranges", "/uwb/tdoa", "/uwb/pose", "/sync/epochs", _STEPS}
+_MEASURED_OF_PERSON = ("/imu/data", "/odometry")
+"""What comes when something was measured; other topics beat time without it."""
 _TYPES = {
     POSES: "mine_loc_interfaces/msg/PersonPoseArray",
     **dict.fromkeys(_VERDICTS, "mine_loc_interfaces/msg/MeasurementVerdictArray"),
@@ -47,7 +50,7 @@ class _Columns:
 
 @dataclass(slots=True)
 class Outputs:
-    """What a bag holds of the graph's outputs. `span_ns`: first and last log time of what is not truth."""
+    """What a bag holds of the graph's outputs. `span_ns`: of its first and last measurement, else pose."""
 
     tracks: dict[str, Track] = field(default_factory=dict)
     frame: str = ""
@@ -76,7 +79,7 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
     with open_bag(bag) as messages:
         _check_topics(bag, messages.topics)
         for topic, logged_ns, read in _messages(messages, set(messages.topics), progress):
-            if not topic.startswith("/truth/"):
+            if topic in _MEASURED or topic.endswith(_MEASURED_OF_PERSON):
                 first_ns, last_ns = min(first_ns, logged_ns), max(last_ns, logged_ns)
             if topic == POSES:
                 _take_poses(read(), logged_ns, columns, outputs)
@@ -89,7 +92,11 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
     outputs.found_steps, outputs.true_steps = (
         {name: np.unique(np.array(stamps, np.int64)) for name, stamps in found.items()} for found in steps.values()
     )
-    outputs.span_ns = (min(first_ns, last_ns), last_ns)
+    if last_ns:
+        outputs.span_ns = (first_ns, last_ns)
+    elif outputs.tracks:
+        every_ns = np.concatenate([track.logged_ns for track in outputs.tracks.values()])
+        outputs.span_ns = (int(every_ns.min()), int(every_ns.max()))
     return outputs
 
 

@@ -51,6 +51,12 @@ class Compared:
     alignment: Alignment = _NO_ALIGNMENT
     time_offset_s: float | None = None
     steps: StepCount | None = None
+    has_truth: bool = True
+
+    @property
+    def due(self) -> bool:
+        """Whether outputs are to be expected: some came, or it is known where the person was."""
+        return bool(len(self.track)) or self.has_truth
 
     @property
     def error_m(self) -> Array:
@@ -95,8 +101,8 @@ class Measures:
     nees_low: float | None = None
     nees_high: float | None = None
     independent_errors: float | None = None
-    availability: float = 0.0
-    availability_measured: float = 0.0
+    availability: float | None = None
+    availability_measured: float | None = None
     first_output_s: float | None = None
     longest_gap_s: float | None = None
     latency_p50_ms: float | None = None
@@ -118,7 +124,7 @@ def compare(
     comparing: Comparing,
     steps: StepCount | None = None,
 ) -> Compared:
-    """Lay the truth under a person's outputs. `span_ns`: when there was input; outputs are due while truth lasts, too.
+    """Lay the truth under a person's outputs. `span_ns`: when there was input; outputs are due then, while truth lasts.
 
     Raises ValueError where a transform or offset is asked for and truth covers too little of the outputs.
     """
@@ -126,7 +132,8 @@ def compare(
     times_s, logged_s = (track.stamp_ns - origin_ns) / NS_PER_S, (track.logged_ns - origin_ns) / NS_PER_S
     span_s = (0.0, (end_ns - origin_ns) / NS_PER_S)
     if truth is None or not len(truth.stamp_ns):
-        return Compared(person, track, times_s, logged_s, np.full((len(track), 2), np.nan), span_s, steps=steps)
+        nowhere = np.full((len(track), 2), np.nan)
+        return Compared(person, track, times_s, logged_s, nowhere, span_s, steps=steps, has_truth=False)
     truth_s = (truth.stamp_ns - origin_ns) / NS_PER_S
     times, places_m = times_s[track.valid], track.position_m[track.valid]
     offset_s = _time_offset(times, places_m, truth_s, truth.position_m, comparing) if len(times) else None
@@ -145,7 +152,7 @@ def measure(compared: Sequence[Compared]) -> Measures:
     """Measures of one person, or of several together."""
     tracks = [each.track for each in compared]
     latency_ms = _joined([(each.logged_s - each.times_s)[each.track.measured] * 1e3 for each in compared])
-    firsts = [each.logged_s[each.track.valid][:1] - each.span_s[0] for each in compared]
+    firsts = [np.maximum(each.logged_s[each.track.valid][:1] - each.span_s[0], 0.0) for each in compared]
     figures: dict[str, float | int | None] = {
         "outputs": sum(map(len, tracks)),
         "not_finite": sum(int((~track.finite).sum()) for track in tracks),
@@ -204,12 +211,14 @@ def _steps(compared: Sequence[Compared]) -> dict[str, float | int | None]:
     return {"steps_true": true, "steps_found": found, "step_count_error": (found - true) / true if true else None}
 
 
-def _availability(compared: Sequence[Compared], which: Sequence[Booleans]) -> float:
+def _availability(compared: Sequence[Compared], which: Sequence[Booleans]) -> float | None:
+    """The mean over those whose outputs are due."""
     shares = [
         availability(each.logged_s[used], *each.span_s, max_age_s=MAX_AGE_S)
         for each, used in zip(compared, which, strict=True)
+        if each.due
     ]
-    return float(np.mean(shares)) if shares else 0.0
+    return float(np.mean(shares)) if shares else None
 
 
 def _mode_shares(compared: Sequence[Compared]) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from mine_loc_bringup.evaluation.evaluation import Evaluation
 from mine_loc_bringup.evaluation.measures import Measures
@@ -32,10 +32,7 @@ _ROWS: Mapping[str, str] = {
     "not_finite": "outputs not finite",
     "backward_stamps": "stamps that went back",
 }
-_INTERVALS = {
-    "claimed_ce95_holds": ("claimed_ce95_holds_low", "claimed_ce95_holds_high"),
-    "nees_mean": ("nees_low", "nees_high"),
-}
+_INTERVAL_BELOW = {"claimed_ce95_holds": ("claimed_ce95_holds", "… with 95 %"), "nees_mean": ("nees", "… if honest")}
 
 
 def measures_table(found: Evaluation, title: str) -> Table:
@@ -43,13 +40,18 @@ def measures_table(found: Evaluation, title: str) -> Table:
     shown = dict(list(found.people.items())[:_MOST_PEOPLE])
     columns = shown | ({"together": found.together} if len(found.people) > 1 else {})
     hidden = len(found.people) - len(shown)
-    table = Table("", *columns, title=title, caption=f"and {hidden} people more, see --json" if hidden else None)
+    table = Table(
+        Column(no_wrap=True), *columns, title=title, caption=f"and {hidden} people more, see --json" if hidden else None
+    )
     for column in table.columns[1:]:
         column.justify = "right"
     for name, heading in _ROWS.items():
         cells = [_cell(each, name) for each in columns.values()]
         if any(cells):
             table.add_row(escape(heading), *map(escape, cells))
+        if any(cells) and name in _INTERVAL_BELOW:
+            stem, below = _INTERVAL_BELOW[name]
+            table.add_row(below, *[_interval(each, stem) for each in columns.values()])
     for mode in sorted({mode for each in columns.values() for mode in each.modes}):
         table.add_row(f"mode {mode}", *[f"{each.modes.get(mode, 0.0):.1%}" for each in columns.values()])
     return table
@@ -69,8 +71,9 @@ def _cell(measures: Measures, name: str) -> str:
     value = getattr(measures, name)
     if value is None:
         return ""
-    text = str(value) if isinstance(value, int) else f"{value:.3f}"
-    if name in _INTERVALS:
-        low, high = (getattr(measures, end) for end in _INTERVALS[name])
-        text += f" [{low:.2f}, {high:.2f}]"
-    return text
+    return str(value) if isinstance(value, int) else f"{value:.3f}"
+
+
+def _interval(measures: Measures, name: str) -> str:
+    low, high = (getattr(measures, f"{name}_{end}") for end in ("low", "high"))
+    return "" if low is None else f"{low:.2f} to {high:.2f}"
