@@ -193,7 +193,7 @@ def test_outputs_are_due_from_the_first_measurement_on(tmp_path):
     late = lambda times_s: times_s >= 10.0  # noqa: E731
     unmeasured = write_bag(tmp_path / "bag", keep=late)
     assert figures(tmp_path, str(unmeasured))["people"]["ann"]["availability"] == pytest.approx(1.0, abs=0.01)
-    measured = write_bag(tmp_path / "measured", keep=late, steps=[0.0])
+    measured = write_bag(tmp_path / "measured", keep=late, steps=[0.0])  # which is where measurements end, too
     one = figures(tmp_path, str(measured))["people"]["ann"]
     assert one["availability"] == pytest.approx(0.5, abs=0.01)
     assert one["first_output_s"] == pytest.approx(10.02)

@@ -50,7 +50,7 @@ class _Columns:
 
 @dataclass(slots=True)
 class Outputs:
-    """What a bag holds of the graph's outputs. `span_ns`: of its first and last measurement, else pose."""
+    """What a bag holds of the graph's outputs. `span_ns`: from the first measurement to what came last."""
 
     tracks: dict[str, Track] = field(default_factory=dict)
     frame: str = ""
@@ -80,7 +80,9 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
         _check_topics(bag, messages.topics)
         for topic, logged_ns, read in _messages(messages, set(messages.topics), progress):
             if topic in _MEASURED or topic.endswith(_MEASURED_OF_PERSON):
-                first_ns, last_ns = min(first_ns, logged_ns), max(last_ns, logged_ns)
+                first_ns = min(first_ns, logged_ns)
+            if not topic.startswith("/truth/"):
+                last_ns = max(last_ns, logged_ns)
             if topic == POSES:
                 _take_poses(read(), logged_ns, columns, outputs)
             elif topic in _VERDICTS:
@@ -92,11 +94,8 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
     outputs.found_steps, outputs.true_steps = (
         {name: np.unique(np.array(stamps, np.int64)) for name, stamps in found.items()} for found in steps.values()
     )
-    if last_ns:
-        outputs.span_ns = (first_ns, last_ns)
-    elif outputs.tracks:
-        every_ns = np.concatenate([track.logged_ns for track in outputs.tracks.values()])
-        outputs.span_ns = (int(every_ns.min()), int(every_ns.max()))
+    first_ns = min(first_ns, *(int(track.logged_ns[0]) for track in outputs.tracks.values()), last_ns)
+    outputs.span_ns = (first_ns, last_ns)
     return outputs
 
 
