@@ -1,6 +1,7 @@
 """mine-loc evaluate on small bags whose errors are known."""
 
 import json
+import re
 import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import fields
@@ -17,6 +18,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from mine_loc_bringup.bag_writer import BagWriter
+from mine_loc_bringup.evaluation.expectations import load_expectations
 from mine_loc_bringup.evaluation.measures import Measures
 from mine_loc_bringup.main import main
 from mine_loc_core.nodes.conversions import to_time
@@ -145,6 +147,19 @@ def test_a_bad_file_of_bounds_names_line_key_and_what_is_allowed(tmp_path, capsy
     assert line.startswith(f"{tmp_path / 'expected.yaml'}:")
     assert key in line
     assert allowed in line
+
+
+def test_the_example_of_the_docs_is_a_good_file(tmp_path):
+    text = (Path(__file__).parents[3] / "docs" / "evaluate.md").read_text("utf-8")
+    (example,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "bounds.yaml").write_text(example, "utf-8")
+    assert set(load_expectations(tmp_path / "bounds.yaml")["people"]) == {"*", "fitter"}
+
+
+def test_the_docs_explain_every_measure():
+    text = (Path(__file__).parents[3] / "docs" / "evaluate.md").read_text("utf-8")
+    ends = ("claimed_ce95_holds_low", "claimed_ce95_holds_high")
+    assert [field.name for field in fields(Measures) if field.name not in ends and f"`{field.name}`" not in text] == []
 
 
 def test_the_schema_knows_every_measure_mode_and_reason():

@@ -1,6 +1,7 @@
 """mine-loc import: public recordings become bags in our topics, and what is missing or wrong is named."""
 
 import gzip
+import hashlib
 import itertools
 import json
 import os
@@ -132,6 +133,16 @@ def test_a_receivers_time_is_unwrapped():
     assert unwrapped_s([17.0, 17.2, 0.1, 0.5]) == pytest.approx(
         [0.0, 0.2, 0.2 + 0.1 + 17.207401 - 17.2, 0.7074], abs=1e-4
     )
+
+
+@pytest.mark.data
+def test_the_public_files_are_those_of_the_published_hashes():
+    root = public("trek1000_bielefeld").parent
+    lines = (Path(__file__).parents[3] / "docs" / "data.sha256").read_text().splitlines()
+    known = {name: digest for digest, name in (line.split("  ") for line in lines)}
+    here = {name: hashlib.sha256((root / name).read_bytes()).hexdigest() for name in known if (root / name).is_file()}
+    assert len(here) > 200
+    assert here.items() <= known.items()
 
 
 @pytest.mark.data

@@ -151,6 +151,13 @@ def test_what_is_no_number_and_what_went_back_is_counted():
     assert found.scored == len(TIMES_S) - 1
 
 
+@pytest.mark.parametrize(("claimed_m", "holds"), [(np.nan, 0.0), (np.inf, 1.0)])
+def test_a_claim_that_is_no_number_is_judged_and_not_reported(claimed_m, holds):
+    found = measured(track(path_m(TIMES_S), ce95_m=claimed_m), truth())
+    assert found.claimed_ce95_m is None
+    assert found.claimed_ce95_holds == holds
+
+
 def test_people_are_pooled_and_their_availability_is_the_mean():
     near = compare("ann", track(shifted(1.0, 0.0)), truth(), SPAN_NS, Comparing())
     far = compare("bob", track(shifted(3.0, 0.0)), truth(), SPAN_NS, Comparing())

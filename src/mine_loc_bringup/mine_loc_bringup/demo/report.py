@@ -19,8 +19,6 @@ from mine_loc_core.stamps import NS_PER_S, to_ns
 Array = npt.NDArray[np.float64]
 
 _GAP_S = 0.5
-_STARTING_S = 1.0
-"""The first outputs are due after so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +40,9 @@ def person_report(name: str, track: Track, truth: Truth, started_ns: int, end_s:
     own = not truth.shared_clock_and_frame
     stamps_ns = started_ns + np.round(truth.times_s * NS_PER_S).astype(np.int64)
     known = evaluated.Truth(stamps_ns, truth.positions_m[:, :2])
-    due_ns = (started_ns + to_ns(_STARTING_S), started_ns + to_ns(end_s))
+    due_ns = (started_ns, started_ns + to_ns(end_s))
     compared = compare(name, track, known, due_ns, Comparing(rigid=own, apply_time_offset=own))
-    received_s = compared.logged_s + _STARTING_S
-    gaps = [(a, b - a) for a, b in itertools.pairwise(received_s) if b - a > _GAP_S]
+    gaps = [(a, b - a) for a, b in itertools.pairwise(compared.logged_s) if b - a > _GAP_S]
     figures = asdict(measure([compared])) | {
         "gaps_over_half_a_second": [{"at_s": round(float(a), 2), "length_s": round(float(b), 2)} for a, b in gaps],
         "alignment": compared.alignment.as_json(),

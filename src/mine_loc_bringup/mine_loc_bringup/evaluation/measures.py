@@ -167,7 +167,9 @@ def measure(compared: Sequence[Compared]) -> Measures:
         "latency_p99_ms": float(np.percentile(latency_ms, 99)) if len(latency_ms) else None,
         "time_offset_s": compared[0].time_offset_s if len(compared) == 1 else None,
     }
-    return Measures(**figures, **_errors(compared), **_steps(compared), modes=_mode_shares(compared))  # type: ignore[arg-type]
+    figures |= _errors(compared) | _steps(compared)
+    known = {name: value for name, value in figures.items() if value is not None and np.isfinite(value)}
+    return Measures(**known, modes=_mode_shares(compared))  # type: ignore[arg-type]
 
 
 def _errors(compared: Sequence[Compared]) -> dict[str, float | int | None]:
