@@ -72,23 +72,18 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _evaluate(arguments: argparse.Namespace) -> Any:
-    from mine_loc_bringup.evaluation.bag import read_outputs, read_truth  # noqa: PLC0415 slow
-    from mine_loc_bringup.evaluation.evaluation import evaluate  # noqa: PLC0415
+    from mine_loc_bringup.evaluation.bag_evaluation import evaluate_bag  # noqa: PLC0415 slow
     from mine_loc_bringup.evaluation.measures import Comparing  # noqa: PLC0415
 
     with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("reading", total=2.0)
-        outputs = read_outputs(arguments.bag, lambda share: progress.update(task, completed=share))
-        truth_bag = arguments.truth_bag or arguments.bag
-        topic = arguments.truth or _TRUTH
-        truths = read_truth(
-            truth_bag, topic, list(outputs.tracks), lambda share: progress.update(task, completed=1.0 + share)
+        task = progress.add_task("reading", total=1.0)
+        return evaluate_bag(
+            arguments.bag,
+            truth_bag=arguments.truth_bag,
+            truth=arguments.truth,
+            comparing=Comparing(rigid=arguments.align == "rigid", apply_time_offset=arguments.apply_time_offset),
+            progress=lambda share: progress.update(task, completed=share),
         )
-    if (arguments.truth or arguments.truth_bag) and not truths:
-        raise ConfigurationError(f"{truth_bag}: no topic {topic}; allowed: a bag that has it")
-    steps = {name: count for name in outputs.true_steps if (count := outputs.steps(name)) is not None}
-    comparing = Comparing(rigid=arguments.align == "rigid", apply_time_offset=arguments.apply_time_offset)
-    return evaluate(outputs.tracks, truths, steps, outputs.verdicts, outputs.span_ns, comparing, outputs.frame)
 
 
 def _write_json(file: Path, arguments: argparse.Namespace, figures: dict[str, Any]) -> None:
