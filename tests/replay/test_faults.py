@@ -11,10 +11,8 @@ from replay import faults
 
 from mine_loc_bringup.bag_messages import open_bag
 from mine_loc_bringup.bag_writer import BagWriter
-from mine_loc_bringup.evaluation.bag import TRUTH, read_outputs, read_truth
-from mine_loc_bringup.evaluation.evaluation import Evaluation, evaluate
+from mine_loc_bringup.evaluation.bag_evaluation import evaluate_bag
 from mine_loc_bringup.evaluation.expectations import checks, load_expectations
-from mine_loc_bringup.evaluation.measures import Comparing
 from mine_loc_bringup.nodes.offline_replay import OfflineReplay
 
 WALK = Path(__file__).parent / "walk"
@@ -43,13 +41,6 @@ def replayed(fault: str, out: Path) -> None:
     assert not run.faults, "a node raised an exception"
 
 
-def evaluated(bag: Path) -> Evaluation:
-    outputs = read_outputs(bag)
-    truths = read_truth(bag, TRUTH, list(outputs.tracks))
-    comparing = Comparing(rigid=False, apply_time_offset=False)
-    return evaluate(outputs.tracks, truths, {}, outputs.verdicts, outputs.span_ns, comparing, outputs.frame)
-
-
 def test_every_fault_has_its_expectations():
     assert {file.stem for file in EXPECTATIONS} == set(faults.NAMES)
 
@@ -57,6 +48,6 @@ def test_every_fault_has_its_expectations():
 @pytest.mark.parametrize("expectations", EXPECTATIONS, ids=lambda file: file.stem)
 def test_the_graph_stands(expectations, tmp_path):
     replayed(expectations.stem, tmp_path / "out")
-    found = list(checks(load_expectations(expectations), evaluated(tmp_path / "out")))
+    found = list(checks(load_expectations(expectations), evaluate_bag(tmp_path / "out")))
     assert found
     assert [str(check) for check in found if not check.passed] == []

@@ -1,8 +1,12 @@
 """What walls say of an estimate: a person in a gallery is between its walls.
 
-The Gaussian across the gallery is cut off at the walls and replaced by the one of the same mean and variance (density
-truncation: Simon, "Kalman filtering with state constraints", IET Control Theory and Applications 4, 2010). It is done
-to what is put out, never fed back, because walls seen again are no new evidence.
+Inside, the Gaussian across the gallery is cut off at the walls and replaced by the one of the same mean and variance
+(density truncation: Simon, "Kalman filtering with state constraints", IET Control Theory and Applications 4, 2010). It
+is done to what is put out, never fed back, because walls seen again are no new evidence.
+
+An estimate in the rock is another matter: there the walls contradict what led to it. In a gallery, anchors stand nearly
+in line, and ranges that are too long on both sides of a person are explained by a place far out across it as well as by
+their biases. The walls say which; so they are fed back, and the biases take up what is left.
 """
 
 import math
@@ -15,6 +19,26 @@ from mine_loc_fusion.estimate import Array
 _REACH_SD = 3.0
 _LEAST_SHARE = 1e-4
 """Less of the Gaussian than this between the walls: it is the map, or the place, that is wrong."""
+_IN_ROCK_M = 0.05
+_NOTHING_M2 = 1e6
+_HALF_WIDTH_M = 2.0
+"""Of a common gallery: how far inside its wall the middle is."""
+
+
+def inside(position_m: Array, area: WalkableArea) -> tuple[Array, Array] | None:
+    """Where a person is whom ranges place in the rock: anywhere across the nearest gallery, along it as found.
+
+    Position (2,) and covariance (2, 2), of which the part along the gallery says nothing; None where `position_m` (2,)
+    is no rock.
+    """
+    wall_m = area.nearest(position_m[None])[0]
+    out_m = position_m - wall_m
+    depth_m = float(np.hypot(*out_m))
+    if depth_m < _IN_ROCK_M:
+        return None
+    out = out_m / depth_m
+    across = np.outer(out, out)
+    return wall_m - _HALF_WIDTH_M * out, _HALF_WIDTH_M**2 / 3.0 * across + _NOTHING_M2 * (np.eye(2) - across)
 
 
 def between_walls(position_m: Array, velocity_ms: Array, covariance: Array, area: WalkableArea) -> tuple[Array, ...]:

@@ -27,7 +27,7 @@ from mine_loc_fusion.estimate import (
     is_step,
     symmetric,
 )
-from mine_loc_fusion.gallery_walls import between_walls
+from mine_loc_fusion.gallery_walls import between_walls, inside
 from mine_loc_fusion.step_kernel import OWN_STATES, SCALE, YAW
 from mine_loc_fusion.tightly_coupled_settings import TightlyCoupledSettings
 from mine_loc_fusion.yaw_alignment import YawAlignment
@@ -99,6 +99,8 @@ class TightlyCoupled:
             verdicts.append(self._use_position(place, inputs.stamp_ns))
         verdicts += [self._use_step(step, inputs.stamp_ns) for step in inputs.steps]
         verdicts += [self._use_place(place, inputs.stamp_ns) for place in inputs.places]
+        if self._area is not None and self._tracker.started:
+            self._come_inside(self._area)
         return tuple(verdicts)
 
     def estimate(self, stamp_ns: int) -> Estimate | None:
@@ -181,6 +183,12 @@ class TightlyCoupled:
                 self._uwb_ns, self._refused_since_ns = stamp_ns, None
                 return Verdict(Source.UWB_POSE, 0, Reason.ACCEPTED)
         return verdict
+
+    def _come_inside(self, area: WalkableArea) -> None:
+        tracker = self._tracker
+        found = inside(tracker.x[:2], area)
+        if found is not None:
+            step_kernel.take_place(tracker.x, tracker.P, *found, math.inf)
 
     def _use_place(self, place: PlaceFix, stamp_ns: int) -> Verdict:
         if not is_position(place.position_m, place.covariance_m2):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mine_loc_core.site import Chamber, Gallery
 from mine_loc_core.walkable_area import WalkableArea
-from mine_loc_fusion.gallery_walls import between_walls
+from mine_loc_fusion.gallery_walls import between_walls, inside
 
 GALLERY = Gallery("g", ((0, 0, 0), (100, 0, 0)), width_m=4.0, height_m=3.0)
 CROSSING = Gallery("c", ((50, -50, 0), (50, 50, 0)), width_m=4.0, height_m=3.0)
@@ -59,3 +59,19 @@ def test_where_walls_are_not_those_of_one_gallery_nothing_changes(at, area):
     position, _, found = between_walls(np.array(at), np.zeros(2), covariance, area)
     assert position == pytest.approx(at)
     assert found == pytest.approx(covariance)
+
+
+@given(st.floats(-500.0, 500.0), st.floats(2.1, 50.0), st.sampled_from([-1.0, 1.0]))
+def test_from_the_rock_the_nearest_gallery_is_seen_across_and_nothing_along(along_m, off_m, side):
+    """Beyond the gallery's end the nearest of it is that end."""
+    place_m, covariance_m2 = inside(np.array([along_m, side * off_m]), AREA)
+    variances, axes = np.linalg.eigh(covariance_m2)
+    assert variances == pytest.approx([4.0 / 3.0, 1e6])
+    if 0.0 <= along_m <= 100.0:
+        assert place_m == pytest.approx([along_m, 0.0], abs=1e-6)
+        assert abs(axes[1, 0]) == pytest.approx(1.0)
+
+
+@given(st.floats(0.0, 100.0), st.floats(-2.0, 2.0))
+def test_between_the_walls_they_say_nothing_new(along_m, off_m):
+    assert inside(np.array([along_m, off_m]), AREA) is None

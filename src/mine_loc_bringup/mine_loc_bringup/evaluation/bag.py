@@ -4,6 +4,7 @@ import functools
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,14 @@ POSES = "/fused/poses"
 TRUTH = "truth/<person>/pose"
 PLACEHOLDER = "<person>"
 _VERDICTS = {"/fused/verdicts": "fused", "/uwb/verdicts": "uwb"}
+_DIAGNOSTICS = "/diagnostics"
 _STEPS, _TRUE_STEPS = "/pdr/steps", "/truth/steps"
 _MEASURED = {"/uwb/ranges", "/uwb/tdoa", "/uwb/pose", "/sync/epochs", _STEPS}
 _MEASURED_OF_PERSON = ("/imu/data", "/odometry")
 """What comes when something was measured; other topics beat time without it."""
 _TYPES = {
     POSES: "mine_loc_interfaces/msg/PersonPoseArray",
+    _DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
     **dict.fromkeys(_VERDICTS, "mine_loc_interfaces/msg/MeasurementVerdictArray"),
     **dict.fromkeys((_STEPS, _TRUE_STEPS), "mine_loc_interfaces/msg/Step"),
 }
@@ -56,6 +59,8 @@ class Outputs:
     frame: str = ""
     verdicts: dict[str, dict[str, Counter[str]]] = field(default_factory=dict)
     """Topic (fused, uwb) → source → reason → how many."""
+    counters: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Diagnostic (as `synchroniser: inputs`) → key → the last number told."""
     found_steps: dict[str, Integers] = field(default_factory=dict)
     true_steps: dict[str, Integers] = field(default_factory=dict)
     span_ns: tuple[int, int] = (0, 0)
@@ -87,6 +92,8 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
                 _take_poses(read(), logged_ns, columns, outputs)
             elif topic in _VERDICTS:
                 _take_verdicts(read(), outputs.verdicts.setdefault(_VERDICTS[topic], {}))
+            elif topic == _DIAGNOSTICS:
+                _take_counters(read(), outputs.counters)
             elif topic in steps:
                 message = read()
                 steps[topic].setdefault(message.person, []).append(_ns(message.header.stamp))
@@ -176,6 +183,14 @@ def _take_verdicts(message: Any, counts: dict[str, Counter[str]]) -> None:
     for verdict in message.verdicts:
         source = _name(Source, verdict.source)
         counts.setdefault(source, Counter())[_name(Reason, verdict.reason)] += 1
+
+
+def _take_counters(message: Any, counters: dict[str, dict[str, float]]) -> None:
+    for status in message.status:
+        own = counters.setdefault(status.name, {})
+        for item in status.values:
+            with suppress(ValueError):
+                own[item.key] = float(item.value)
 
 
 def _name(kind: type[Source] | type[Reason], number: int) -> str:

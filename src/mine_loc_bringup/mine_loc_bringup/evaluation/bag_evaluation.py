@@ -29,5 +29,12 @@ def evaluate_bag(
         raise ConfigurationError(f"{source}: no topic {topic}; allowed: a bag that has it")
     steps = {name: count for name in outputs.true_steps if (count := outputs.steps(name)) is not None}
     return evaluate(
-        outputs.tracks, truths, steps, outputs.verdicts, outputs.span_ns, comparing or Comparing(), outputs.frame
+        outputs.tracks,
+        truths,
+        steps,
+        outputs.verdicts,
+        outputs.span_ns,
+        comparing or Comparing(),
+        outputs.frame,
+        outputs.counters,
     )

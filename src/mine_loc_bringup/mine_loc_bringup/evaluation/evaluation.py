@@ -11,6 +11,7 @@ from mine_loc_bringup.evaluation.measures import Compared, Comparing, Measures, 
 from mine_loc_bringup.evaluation.track import StepCount, Track, Truth
 
 Verdicts = Mapping[str, Mapping[str, Counter[str]]]
+Counters = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +23,7 @@ class Evaluation:
     together: Measures
     verdicts: Verdicts
     notes: Sequence[str] = field(default_factory=list)
+    counters: Counters = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Of plain types."""
@@ -30,6 +32,7 @@ class Evaluation:
             "together": asdict(self.together),
             "people": {name: asdict(found) | {"alignment": alignments[name]} for name, found in self.people.items()},
             "verdicts": {topic: {s: dict(r) for s, r in found.items()} for topic, found in self.verdicts.items()},
+            "diagnostics": {name: dict(found) for name, found in self.counters.items()},
             "notes": list(self.notes),
         }
 
@@ -42,6 +45,7 @@ def evaluate(
     span_ns: tuple[int, int],
     comparing: Comparing,
     frame: str = "",
+    counters: Counters | None = None,
 ) -> Evaluation:
     """Compare and measure everybody who has outputs, truth or steps; `frame` is that of the outputs."""
     compared, notes = [], []
@@ -59,7 +63,7 @@ def evaluate(
             notes.append(f"{name}: {error}")
             compared.append(compare(name, track, None, span_ns, comparing, steps.get(name)))
     people = {each.person: measure([each]) for each in compared}
-    return Evaluation(compared, people, measure(compared), verdicts, notes)
+    return Evaluation(compared, people, measure(compared), verdicts, notes, counters or {})
 
 
 _NOTHING = Track(

@@ -75,6 +75,9 @@ def checks(expected: Mapping[str, Any], found: Evaluation) -> Iterator[Check]:
         counts: Counter[str] = sum(found.verdicts.get(topic, {}).values(), Counter())
         for reason, limits in bounds.items():
             yield Check(f"verdicts.{topic}", reason, _bound(limits), counts[reason])
+    for name, bounds in expected.get("diagnostics", {}).items():
+        for key, limits in bounds.items():
+            yield Check(f"diagnostics.{name}", key, _bound(limits), found.counters.get(name, {}).get(key))
 
 
 def _person_checks(place: str, bounds: Mapping[str, Any], found: Measures | None) -> Iterator[Check]:
