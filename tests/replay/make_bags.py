@@ -46,6 +46,15 @@ SCENES = {
             "/truth/fitter/pose": 5,
         },
     ),
+    "damaged_lines": Scene(
+        "example_mine",
+        (
+            *("--people", "1", "--seconds", "30", "--seed", "14"),
+            *("--fault", "noise@4+3", "--fault", "truncation@9+3", "--fault", "stall@14+1.5"),
+            *("--fault", "unplug@18+3", "--fault", "clock_step@24+1"),
+        ),
+        {"/uwb/ranges": 1, "/fitter/imu/data": 1, "/truth/fitter/pose": 5},
+    ),
     "bearings": Scene(
         "field_15km",
         ("--people", "2", "--seconds", "60", "--seed", "13"),

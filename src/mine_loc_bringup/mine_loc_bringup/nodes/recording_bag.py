@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rclpy.serialization import serialize_message
-
 from mine_loc_bringup.bag_writer import BagWriter
+from mine_loc_bringup.nodes.cdr import to_cdr
 from mine_loc_bringup.nodes.truth_messages import to_true_link, to_true_pose, to_true_step
 from mine_loc_bringup.recordings.recording import Instant, Recording
 from mine_loc_bringup.recordings.site_files import write_site
@@ -46,7 +45,7 @@ def _write_messages(recording: Recording, path: Path) -> Iterator[int]:
     try:
         streams = [_rounds(recording), _accumulators(recording), *_imu(recording), *_truth(recording)]
         for number, (arrival_ns, topic, message) in enumerate(heapq.merge(*streams, key=lambda entry: entry[0])):
-            writer.write(topic, type(message), arrival_ns, serialize_message(message))
+            writer.write(topic, type(message), arrival_ns, to_cdr(message, type(message)))
             yield number + 1
     finally:
         writer.close()

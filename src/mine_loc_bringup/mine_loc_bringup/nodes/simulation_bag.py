@@ -10,9 +10,9 @@ from typing import Any, Protocol
 
 import numpy as np
 from mine_loc_interfaces.msg import CirFrame, TdoaArray, UwbRangeArray
-from rclpy.serialization import serialize_message
 
 from mine_loc_bringup.bag_writer import BagWriter
+from mine_loc_bringup.nodes.cdr import to_cdr
 from mine_loc_bringup.nodes.truth_messages import to_true_link, to_true_pose, to_true_step
 from mine_loc_coarse.bearing_stream import BearingStream
 from mine_loc_coarse.nodes.messages import to_bearing_arrays
@@ -64,7 +64,7 @@ def write_bag(scenario: Scenario, faults: Sequence[Fault], path: Path) -> Iterat
                     entries.append(_truth_step(name, left.pop(0)))
             entries.sort(key=lambda entry: entry[0])
             for at_ns, topic, message in entries:
-                writer.write(topic, type(message), START_NS + at_ns, serialize_message(message))
+                writer.write(topic, type(message), START_NS + at_ns, to_cdr(message, type(message)))
             yield block.stop_ns, len(entries)
     finally:
         writer.close()
