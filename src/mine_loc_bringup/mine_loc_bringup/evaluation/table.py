@@ -40,9 +40,12 @@ def measures_table(found: Evaluation, title: str) -> Table:
     shown = dict(list(found.people.items())[:_MOST_PEOPLE])
     columns = shown | ({"together": found.together} if len(found.people) > 1 else {})
     hidden = len(found.people) - len(shown)
-    table = Table(
-        Column(no_wrap=True), *columns, title=title, caption=f"and {hidden} people more, see --json" if hidden else None
-    )
+    return columns_table(columns, title, f"and {hidden} people more, see --json" if hidden else None)
+
+
+def columns_table(columns: Mapping[str, Measures], title: str, caption: str | None = None) -> Table:
+    """A column of measures for each name; measures that nobody has are left out."""
+    table = Table(Column(no_wrap=True), *columns, title=title, caption=caption)
     for column in table.columns[1:]:
         column.justify = "right"
     for name, heading in _ROWS.items():
