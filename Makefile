@@ -25,9 +25,10 @@ test: setup      ## all checks: style, types, unit, live graph and fault tests
 check: setup     ## style and types only
 	@$(run) ruff format --check --quiet src tests bench examples && ruff check src tests bench examples && mypy
 
-nightly: setup   ## ten million random bytes for the decoders, ten minutes of ten simulated people
+nightly: setup   ## ten million random bytes for the decoders, ten minutes of ten people, an hour of one in a replay
 	@$(run) MINE_LOC_FUZZ_BYTES=10000000 pytest tests/fuzz
 	@$(run) MINE_LOC_SIM_SECONDS=600 pytest --timeout 600 tests/unit/mine_loc_sim/test_byte_streams.py
+	@$(run) MINE_LOC_SOAK_SECONDS=3600 pytest tests/replay/test_soak.py
 
 bench-sim: setup ## the simulator against its models and real data (bench/results/sim.json)
 	@$(run) python bench/sim.py

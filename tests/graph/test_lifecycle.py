@@ -12,7 +12,7 @@ from mine_loc_interfaces.msg import UwbPose, UwbRange, UwbRangeArray
 
 pytestmark = pytest.mark.graph
 
-CYCLES = 20
+CYCLES = 100
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def round_message(number: int) -> UwbRangeArray:
     return message
 
 
-def test_a_node_survives_twenty_cycles_and_answers_each_round_once_while_active(solver, observer):
+def test_a_node_survives_a_hundred_cycles_and_answers_each_round_once_while_active(solver, observer):
     poses = observer.listen(UwbPose, "uwb/pose")
     rounds = observer.node.create_publisher(UwbRangeArray, "uwb/ranges", 10)
     sent = []
