@@ -41,10 +41,13 @@ def inside(position_m: Array, area: WalkableArea) -> tuple[Array, Array] | None:
     return wall_m - _HALF_WIDTH_M * out, _HALF_WIDTH_M**2 / 3.0 * across + _NOTHING_M2 * (np.eye(2) - across)
 
 
-def between_walls(position_m: Array, velocity_ms: Array, covariance: Array, area: WalkableArea) -> tuple[Array, ...]:
+def between_walls(
+    position_m: Array, velocity_ms: Array, covariance: Array, area: WalkableArea, *, doubted: bool = False
+) -> tuple[Array, ...]:
     """Position (2,), velocity (2,) and their covariance (4, 4) with the walls of the one gallery in reach.
 
-    Unchanged where several galleries or a chamber are within three standard deviations.
+    `doubted`: ranges placed the person in the rock lately, so across the gallery nothing better is claimed than to be
+    in it. Unchanged where several galleries or a chamber are within three standard deviations.
     """
     sd_m = math.sqrt(max(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), 0.0))
     found = _only_leg(position_m, _REACH_SD * sd_m, area)
@@ -57,7 +60,10 @@ def between_walls(position_m: Array, velocity_ms: Array, covariance: Array, area
     shift, share = _truncated(math.sqrt(variance_m2), off_m, half_m)
     gain = Ph / variance_m2
     change = gain * shift
-    kept = covariance - np.outer(gain, gain) * variance_m2 * (1.0 - share)
+    kept_m2 = variance_m2 * share
+    if doubted:
+        kept_m2 = max(kept_m2, half_m**2 / 3.0)
+    kept = covariance + np.outer(gain, gain) * (kept_m2 - variance_m2)
     return position_m + change[:2], velocity_ms + change[2:], kept
 
 

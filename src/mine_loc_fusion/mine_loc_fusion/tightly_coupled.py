@@ -74,6 +74,7 @@ class TightlyCoupled:
         self._uwb_ns: int | None = None
         self._ranges_ns: int | None = None
         self._region_ns: int | None = None
+        self._rock_ns: int | None = None
         self._refused_since_ns: int | None = None
 
     def begin(self, stamp_ns: int, position_m: Array, covariance_m2: Array, yaw: tuple[float, float] | None) -> None:
@@ -117,7 +118,8 @@ class TightlyCoupled:
             covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
         covariance[:2, :2] += self._systematic_m2
         if self._area is not None:
-            position, velocity, covariance = between_walls(position, velocity, covariance, self._area)
+            doubted = _since_s(self._rock_ns, stamp_ns) < self._s.in_rock_counts_s
+            position, velocity, covariance = between_walls(position, velocity, covariance, self._area, doubted=doubted)
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
         uwb_s, step_s, region_s = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
         height_m = None if d == 2 else float(tracker.x[2])
@@ -189,6 +191,7 @@ class TightlyCoupled:
         found = inside(tracker.x[:2], area)
         if found is not None:
             step_kernel.take_place(tracker.x, tracker.P, *found, math.inf)
+            self._rock_ns = self._stamp_ns
 
     def _use_place(self, place: PlaceFix, stamp_ns: int) -> Verdict:
         if not is_position(place.position_m, place.covariance_m2):

@@ -45,5 +45,7 @@ class TightlyCoupledSettings:
     """Drift of the odom frame, over a square root of a second."""
     gate_probability: float = 0.9999
     """Share of good steps and places that pass."""
+    in_rock_counts_s: float = 10.0
+    """Ranges that placed the person in the rock say for so long that they are biased."""
     motion_known_s: float = 1.5
     """A step tells the motion for so long."""

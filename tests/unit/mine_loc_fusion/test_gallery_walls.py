@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from walks import at, ranges_to
 
 from mine_loc_core.site import Chamber, Gallery
 from mine_loc_core.walkable_area import WalkableArea
+from mine_loc_fusion.estimate import EpochInputs
 from mine_loc_fusion.gallery_walls import between_walls, inside
+from mine_loc_fusion.tightly_coupled import TightlyCoupled
 
 GALLERY = Gallery("g", ((0, 0, 0), (100, 0, 0)), width_m=4.0, height_m=3.0)
 CROSSING = Gallery("c", ((50, -50, 0), (50, 50, 0)), width_m=4.0, height_m=3.0)
@@ -75,3 +78,29 @@ def test_from_the_rock_the_nearest_gallery_is_seen_across_and_nothing_along(alon
 @given(st.floats(0.0, 100.0), st.floats(-2.0, 2.0))
 def test_between_the_walls_they_say_nothing_new(along_m, off_m):
     assert inside(np.array([along_m, off_m]), AREA) is None
+
+
+@given(st.floats(-2.0, 2.0), st.floats(0.05, 0.5))
+def test_whom_ranges_placed_in_the_rock_lately_is_only_known_to_be_in_the_gallery(off_m, across_m):
+    _, _, found = between_walls(np.array([30.0, off_m]), np.zeros(2), spread(0.3, across_m), AREA, doubted=True)
+    assert found[1, 1] == pytest.approx(4.0 / 3.0)
+    assert found[0, 0] == pytest.approx(0.09)
+
+
+IN_LINE = np.array([[0.0, 1.8, 2.4], [25.0, -1.8, 2.4], [45.0, -1.8, 2.4], [60.0, 1.8, 2.4]])
+
+
+def test_ranges_too_long_both_ways_along_a_gallery_do_not_place_anybody_in_the_rock():
+    """Without the map they do: a person far out across the gallery would explain them."""
+    found = {}
+    for name, area in (("map", AREA), ("none", None)):
+        subject = TightlyCoupled(area=area)
+        rng = np.random.default_rng(3)
+        for number in range(100):
+            place_m, stamp_ns = (30.0 + 0.1 * number, 0.5), at(0.1 * number)
+            noise_m = 0.6 + rng.normal(0.0, 0.05, len(IN_LINE))
+            ranges = ranges_to(place_m, stamp_ns, noise_m=noise_m, anchors=IN_LINE)
+            subject.update(EpochInputs(stamp_ns, ranges=(ranges,)))
+        found[name] = subject.estimate(stamp_ns)
+    assert abs(found["none"].position_m[1]) > 2.5
+    assert abs(found["map"].position_m[1]) < 2.2

@@ -10,10 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from walks import HALL, HEIGHT_M, T0, Walk, at, is_covariance, place_fix, position_fix, ranges_to, step_fix
 
-from mine_loc_core.site import Gallery
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_core.verdicts import Reason, Source
-from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import EpochInputs, PlaceFix, PositionFix, StepFix
 from mine_loc_fusion.late_inputs import LateInputCorrector
 from mine_loc_fusion.step_kernel import SCALE, YAW
@@ -337,28 +335,6 @@ def test_whatever_it_is_told_the_estimate_is_finite_and_its_covariance_one(space
             assert np.isfinite(estimate.position_m).all()
             assert np.isfinite(estimate.velocity_ms).all()
             assert is_covariance(estimate.covariance)
-
-
-# Walls.
-
-GALLERY = WalkableArea([Gallery("g", ((0, 0, 0), (60, 0, 0)), width_m=4.0, height_m=3.0)])
-IN_LINE = np.array([[0.0, 1.8, 2.4], [25.0, -1.8, 2.4], [45.0, -1.8, 2.4], [60.0, 1.8, 2.4]])
-
-
-def test_ranges_too_long_both_ways_along_a_gallery_do_not_place_anybody_in_the_rock():
-    """Without the map they do: a person far out across the gallery would explain them."""
-    found = {}
-    for name, area in (("map", GALLERY), ("none", None)):
-        subject = TightlyCoupled(area=area)
-        rng = np.random.default_rng(3)
-        for number in range(100):
-            place_m, stamp_ns = (30.0 + 0.1 * number, 0.5), at(0.1 * number)
-            noise_m = 0.6 + rng.normal(0.0, 0.05, len(IN_LINE))
-            ranges = ranges_to(place_m, stamp_ns, noise_m=noise_m, anchors=IN_LINE)
-            subject.update(EpochInputs(stamp_ns, ranges=(ranges,)))
-        found[name] = subject.estimate(stamp_ns)
-    assert abs(found["none"].position_m[1]) > 2.5
-    assert abs(found["map"].position_m[1]) < 2.2
 
 
 # Saving, restoring, and steps that come late.
