@@ -13,7 +13,7 @@ Exit status 1 where not all that came was recorded.
 Examples:
   mine-loc record                                              everything, into mine_loc_<date>_<time>
   mine-loc record build/shift --exclude uwb/cir /rosout        all but accumulators and logs
-  mine-loc record build/inputs --topics uwb/* */imu/*          what the drivers publish
+  mine-loc record build/inputs --topics "uwb/*" "*/imu/*"      what the drivers publish
   mine-loc record build/day --split-size 500 --split-duration 600
 """
 

@@ -12,7 +12,7 @@ Examples:
   mine-loc up --site config/example_mine --sim-time --only uwb_solver pdr synchroniser fusion
   mine-loc replay build/shift --live
   mine-loc replay build/shift --live --rate 5 --start 120
-  mine-loc replay build/shift --live --loop --topics uwb/ranges */imu/*
+  mine-loc replay build/shift --live --loop --topics uwb/ranges "*/imu/*"
   mine-loc replay build/shift --live --topics "**"             everything, as it was heard
 """
 
