@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live lock \
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live bench-recorder lock \
     clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
@@ -50,6 +50,9 @@ bench-coarse: setup ## coarse regions in paper E's setting, with rivals (bench/r
 
 bench-live: setup ## latency, fleets and load of the live graph on two cores (bench/results/live.json)
 	@$(run) python bench/live.py
+
+bench-recorder: setup ## recorders killed under load, cost and rate, the player's punctuality (bench/results/recorder.json)
+	@$(run) python bench/recorder.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

@@ -23,6 +23,7 @@ _MODULES = {  # import name → (name on PyPI, package of Debian and Ubuntu)
     "pymodbus": ("pymodbus", "python3-pymodbus"),
     "rich": ("rich", "python3-rich"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
+    "mcap": ("mcap", ""),
     "rosbags": ("rosbags", ""),
 }
 _TOOLS = {"g++": "g++", "make": "make", "git": "git"}

@@ -17,7 +17,7 @@ import yaml
 from mine_loc_bringup.parameter_files import find_parameter_files
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import People
-from mine_loc_core.site import Discovery, Site
+from mine_loc_core.site import Discovery, Site, load_site
 
 _FAST_DDS_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _REFERENCE = re.compile(r"\{([a-z0-9_.]+)\}")
@@ -55,18 +55,21 @@ class NodeProcess:
 
     @property
     def command(self) -> list[str]:
-        """What to execute where there is no ROS launch.
-
-        Values are written as JSON, which the YAML parser of rcl reads with the right type; they come after the file,
-        so they win over it.
-        """
+        """What to execute where there is no ROS launch. Values come after the file, so they win over it."""
         words = [sys.executable, "-m", self.module, "--ros-args"]
         words += ["-r", f"__node:={self.node_name}", "-r", f"__ns:={self.namespace}"]
         if self.parameter_file:
             words += ["--params-file", str(self.parameter_file)]
-        for name, value in self.parameters.items():
-            words += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
-        return words
+        return words + parameter_words(self.parameters)
+
+
+def parameter_words(parameters: Mapping[str, Any]) -> list[str]:
+    """ROS arguments that set parameters; values as JSON, which the YAML parser of rcl reads with the right type."""
+    return [
+        word
+        for name, value in parameters.items()
+        for word in ("-p", f"{name}:={json.dumps(value, ensure_ascii=False)}")
+    ]
 
 
 @functools.cache
@@ -122,6 +125,15 @@ def discovery_environment(discovery: Discovery) -> dict[str, str]:
         "ROS_STATIC_PEERS": ";".join(discovery.peers),
         _FAST_DDS_PROFILES: os.environ.get(_FAST_DDS_PROFILES, quick),
     }
+
+
+def join_graph(site_folder: Path | None) -> None:
+    """Let this process find the nodes of a site as they find one another, before it imports ROS.
+
+    Without a site folder, discovery reaches as far as the environment says. Raises ConfigurationError for a bad site.
+    """
+    quick = discovery_environment(load_site(site_folder).discovery if site_folder else Discovery())
+    os.environ.update(quick if site_folder else {_FAST_DDS_PROFILES: quick[_FAST_DDS_PROFILES]})
 
 
 def node_environment(discovery: Discovery) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 import functools
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 from rosbags.interfaces.typing import Typesdict
@@ -16,7 +17,9 @@ def workspace_types() -> Typestore:
     """A type store with every message that our nodes speak."""
     types = get_typestore(Stores.ROS2_JAZZY)
     for package in _OUR_PACKAGES:
-        types.register({name: fields for name, fields in _definitions(package).items() if name not in types.fielddefs})
+        types.register(
+            {name: fields for name, fields in package_definitions(package).items() if name not in types.fielddefs}
+        )
     return types
 
 
@@ -32,13 +35,14 @@ def type_name(kind: type) -> str:
     return f"{kind.__module__.split('.', 1)[0]}/msg/{kind.__name__}"
 
 
-def _definitions(package: str) -> Typesdict:
-    """All message definitions of a package that this workspace brings, from the text it installs."""
-    root = Path(str(import_module(package).__file__))
-    folder = next(
-        parent / "share" / package / "msg" for parent in root.parents if (parent / "share" / package).is_dir()
-    )
+def package_definitions(package: str) -> Typesdict:
+    """All message definitions of an installed package, from the text it installs; none of one that is not here."""
+    found = find_spec(package) if package.isidentifier() else None  # names come from bags: nothing is imported yet
+    parents = Path(found.origin).parents if found and found.origin else ()
+    folders = [parent / "share" / package / "msg" for parent in parents if (parent / "share" / package).is_dir()]
+    if not folders:
+        return {}
     definitions: Typesdict = {}
-    for file in sorted(folder.glob("*.msg")):
+    for file in sorted(folders[0].glob("*.msg")):
         definitions.update(get_types_from_msg(file.read_text("utf-8"), f"{package}/msg/{file.stem}"))
     return definitions
