@@ -11,7 +11,7 @@ from mine_loc_bringup import commands
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TARGETS = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
-COMMANDS = {info.name.replace("_", "-") for info in pkgutil.iter_modules(commands.__path__)}
+COMMANDS = {info.name.rstrip("_").replace("_", "-") for info in pkgutil.iter_modules(commands.__path__)}
 
 
 def code(page):

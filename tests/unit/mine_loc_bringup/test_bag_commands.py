@@ -24,7 +24,7 @@ def test_what_cannot_be_done_is_one_line_and_status_2(tmp_path, capsys):
         ("bag", "repair", "none", "out"): "none: there is no such bag; allowed: a folder, or a file .mcap or .db3",
         ("bag", "repair", "bag", "there"): "there: is there already; allowed: a new name",
         ("bag", "repair", "bag", "out"): "no message can be read: bag_0.mcap: it is empty",
-        ("replay", "bag"): "allowed: --live",
+        ("replay", "bag"): "allowed: --out OUT for a new bag, or --live for the running graph",
     }
     for (command, *words), refusal in refusals.items():
         paths = [str(tmp_path / word) if word not in {"repair"} else word for word in words]

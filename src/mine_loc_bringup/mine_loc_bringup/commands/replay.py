@@ -1,4 +1,8 @@
-"""Play a bag again: --live into the running graph, with /clock.
+"""Play a bag again: into a new bag, as fast as the nodes work, or --live into the running graph, with /clock.
+
+With --out the nodes that the bag can drive run on it without middleware, the same to the byte each time, and what they
+publish goes, with the bag's truth/*, into OUT. The site is the folder site/ in the bag's folder or beside it, else
+--site. --map reads bags of other people, --set changes a parameter for this replay: docs/replay.md.
 
 Live, the messages are published as they were recorded, with the quality of service they had, while /clock tells the
 bag's time; run the graph beside it with `mine-loc up --sim-time`. By default that plays what came into the graph
@@ -9,6 +13,9 @@ player/pause does.
 Patterns are those of `mine-loc record`. A loop sets /clock back, on which the nodes begin anew.
 
 Examples:
+  mine-loc replay build/shift --out build/replayed
+  mine-loc replay build/shift --out build/ekf --set fusion.method=ekf
+  mine-loc replay walk.bag --out build/walk --site config/isas_walk --map examples/replay/isas_walk.yaml
   mine-loc up --site config/example_mine --sim-time --only uwb_solver pdr synchroniser fusion
   mine-loc replay build/shift --live
   mine-loc replay build/shift --live --rate 5 --start 120
@@ -44,25 +51,53 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--rate", type=float, default=1.0, metavar="X", help="seconds of the bag that pass in one (default 1)")
     add("--start", type=float, default=0.0, metavar="S", help="begin so long after the bag's beginning")
     add("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
-    add("--site", type=Path, metavar="FOLDER", help="find nodes on other hosts as this site.yaml says")
+    add("--site", type=Path, metavar="FOLDER", help="site of the replay; live: find nodes on other hosts as it says")
     add("--paused", action="store_true", help="begin paused")
+    add("--map", type=Path, metavar="FILE", help="with --out: what the bag's topics and fields are called here")
+    add("--set", action="append", default=[], metavar="NODE.PARAMETER=VALUE", help="with --out: a parameter")
+    add("--json", type=Path, metavar="FILE", help="with --out: write nodes, counts of messages, faults and speed")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Exit status 0 after the whole bag."""
+    """Exit status 0 after the whole bag, 1 if a node raised an exception, 2 for what the user can mend."""
     if arguments.live:
+        _refuse(arguments, "--out", "--map", "--set", "--json")
         return _live(arguments)
-    raise ConfigurationError(f"{arguments.bag}: replay without the graph is not in this version; allowed: --live")
+    _refuse(arguments, "--topics", "--exclude", "--loop", "--paused")
+    if not arguments.out:
+        raise ConfigurationError(f"{arguments.bag}: allowed: --out OUT for a new bag, or --live for the running graph")
+    return _offline(arguments)
+
+
+def _refuse(arguments: argparse.Namespace, *options: str) -> None:
+    """Options that the other way of replaying has."""
+    other = "without --live" if arguments.live else "with --live"
+    for option in options:
+        if getattr(arguments, option[2:]):
+            raise ConfigurationError(f"{option}: allowed: {other}")
+
+
+def _offline(arguments: argparse.Namespace) -> int:
+    from mine_loc_bringup.offline_run import replay_offline  # noqa: PLC0415 slow
+
+    run = replay_offline(
+        Path(arguments.bag), arguments.out, site=arguments.site, mapping=arguments.map, changes=arguments.set
+    )
+    print(f"{arguments.out}: {sum(run.published.values())} messages of {', '.join(run.nodes)}")
+    print(f"{run.bag_s:.1f} s in {run.took_s:.1f} s, {run.speed:.0f} times real time")
+    for where, count in run.faults.items():
+        print(f"exception in {where}: {count} times", file=sys.stderr)
+    if arguments.json:
+        arguments.json.parent.mkdir(parents=True, exist_ok=True)
+        arguments.json.write_text(run.to_json(), "utf-8")
+        print(f"written: {arguments.json}")
+    return 1 if run.faults else 0
 
 
 def _live(arguments: argparse.Namespace) -> int:
     join_graph(arguments.site)
     from mine_loc_bringup.nodes.player import Player, play  # noqa: PLC0415 only here ROS is needed
 
-    if arguments.out:
-        raise ConfigurationError(
-            f"--out: {arguments.out}; allowed: without --live; mine-loc record writes bags of the graph"
-        )
     parameters: dict[str, object] = {
         "bag": arguments.bag,
         "topics": ",".join(arguments.topics),
