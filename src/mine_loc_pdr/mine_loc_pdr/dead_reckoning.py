@@ -25,7 +25,7 @@ from mine_loc_pdr.drift import BIAS, HEADING, DriftModel, X, Y
 from mine_loc_pdr.magnetic_heading import MagneticHeading
 from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
 from mine_loc_pdr.rest import RestDetector
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, Motion, PeakStepDetector, Step, StepDetector
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, PeakStepDetector, Step, StepDetector
 from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2
 
 INITIAL_SPAN_NS = 500 * NS_PER_MS  # of force averaged for the first horizon
@@ -235,7 +235,7 @@ class PedestrianDeadReckoning:
         if resting_rate := self._rest.push(dt_s, sample.rate_rad_s, sample.force_m_s2):
             self._learn_bias(attitude, resting_rate)
         self._remember(sample, attitude.orientation_imu)
-        step = self._detector.push(sample.stamp_ns, _motion(attitude, sample))
+        step = self._detector.push(sample.stamp_ns, attitude.motion(sample.rate_rad_s, sample.force_m_s2))
         return None if step is None else self._walk(attitude, step)
 
     def _remember(self, sample: ImuSample, orientation: Quaternion) -> None:
@@ -313,17 +313,6 @@ def _fault(sample: ImuSample) -> str | None:
     return None
 
 
-def _motion(attitude: AttitudeFilter, sample: ImuSample) -> Motion:
-    """What the step detector is told of a sample."""
-    orientation, (rx, ry, rz), (bx, by, bz) = attitude.orientation_imu, sample.rate_rad_s, attitude.bias_rad_s
-    fx, fy, fz = rotated(orientation, sample.force_m_s2)
-    wx, wy, wz = rotated(orientation, (rx - bx, ry - by, rz - bz))
-    c, s = attitude.facing
-    norm = math.hypot(c, s) or 1.0
-    c, s = c / norm, s / norm
-    return fz - STANDARD_GRAVITY_M_S2, c * fx + s * fy, c * fy - s * fx, wz, c * wx + s * wy, c * wy - s * wx
-
-
 def _levelled(force_m_s2: NDArray[np.float64], facing: NDArray[np.float64]) -> NDArray[np.float64]:
     """Specific force (n, 3) in odom to acceleration along where the waist faces (n, 2), left of it, and up."""
     east, north = (facing / np.linalg.norm(facing, axis=1, keepdims=True)).T
@@ -333,4 +322,7 @@ def _levelled(force_m_s2: NDArray[np.float64], facing: NDArray[np.float64]) -> N
 
 def _clipped(before: Vector3, now: Vector3) -> float:
     """The largest turn rate in rad/s that stands at a limit, 0 if none does."""
+    x, y, z = now
+    if abs(x) < SATURATION_RAD_S and abs(y) < SATURATION_RAD_S and abs(z) < SATURATION_RAD_S:
+        return 0.0  # of nearly every sample
     return max(abs(b) if a == b and abs(b) >= SATURATION_RAD_S else 0.0 for a, b in zip(before, now, strict=True))

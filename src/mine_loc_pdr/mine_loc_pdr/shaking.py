@@ -79,8 +79,8 @@ def band_noise(rng: np.random.Generator, frames: int, low_hz: float, high_hz: fl
     """Gaussian noise (frames,) of one band, rms 1."""
     hz = np.fft.rfftfreq(frames, _FRAME_S)
     waves = ((hz >= low_hz) & (hz <= high_hz)) * (rng.standard_normal(len(hz)) + 1j * rng.standard_normal(len(hz)))
-    noise: Array = np.asarray(np.fft.irfft(waves, frames), np.float64)
-    return noise * (1.0 / float(noise.std()))
+    noise = np.fft.irfft(waves, frames)
+    return np.asarray(noise / noise.std(), np.float64)
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:

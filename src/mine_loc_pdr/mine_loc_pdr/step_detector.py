@@ -81,9 +81,18 @@ class NetworkStepDetector:
         walking = since_ns is not None and since_ns <= LONGEST_INTERVAL_NS
         swing_m_s2 = self._swing_m_s2(self._since_step if walking else _FIRST_SWING_FRAMES)
         self._last_step_ns, self._since_step = stamp_ns, 0
-        return Step(stamp_ns, to_s(since_ns) if walking and since_ns else None, swing_m_s2, probability)
+        interval_s = to_s(since_ns) if walking and since_ns else None
+        return Step(stamp_ns, interval_s, swing_m_s2, _confidence(probability))
 
     def _swing_m_s2(self, frames: int) -> float:
         """From valley to peak of the smoothed vertical acceleration in the last frames."""
         recent = np.fromiter(self._vertical, float)[-(frames + len(_SMOOTHING) - 1) :]
         return float(np.ptp(np.convolve(recent, _SMOOTHING, "valid" if len(recent) >= len(_SMOOTHING) else "same")))
+
+
+def _confidence(probability: float) -> float:
+    """How often a maximum of this probability is a step: logistic in its logit, of people left out of the training.
+
+    The network is less sure than it could be: a strike's neighbours share its probability.
+    """
+    return 1.0 / (1.0 + math.exp(-0.7) * math.pow(1.0 / probability - 1.0, 1.8))

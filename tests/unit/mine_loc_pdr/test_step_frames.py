@@ -40,7 +40,9 @@ def test_a_wave_of_walking_is_the_same_at_any_rate(rate_hz):
 
 def test_an_offset_of_the_vertical_goes_away_and_no_other():
     stream = FrameStream()
-    frames = np.concatenate([stream.push(k * 10 * NS_PER_MS, (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)).copy() for k in range(2000)])
+    frames = np.concatenate(
+        [stream.push(k * 10 * NS_PER_MS, (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)).copy() for k in range(2000)]
+    )
     assert frames[-1, 0] == pytest.approx(0.0, abs=0.01)
     assert frames[-1, 1] == pytest.approx(1.0)
 
