@@ -35,7 +35,7 @@ def imu(at_s: float, start_ns: int) -> Imu:
     message.linear_acceleration.z = 9.80665 + bounce
     if walking:
         message.linear_acceleration.y = SWAY_M_S2 * math.sin(math.pi * STEP_HZ * at_s)
-        message.angular_velocity.x = ROLL_RAD_S * math.cos(math.pi * STEP_HZ * at_s)
+        message.angular_velocity.x = -ROLL_RAD_S * math.cos(math.pi * STEP_HZ * at_s)
     return message
 
 

@@ -79,8 +79,9 @@ def band_noise(rng: np.random.Generator, frames: int, low_hz: float, high_hz: fl
     """Gaussian noise (frames,) of one band, rms 1."""
     hz = np.fft.rfftfreq(frames, _FRAME_S)
     waves = ((hz >= low_hz) & (hz <= high_hz)) * (rng.standard_normal(len(hz)) + 1j * rng.standard_normal(len(hz)))
-    noise = np.fft.irfft(waves, frames)
-    return np.asarray(noise / noise.std(), np.float64)
+    noise: Array = np.fft.irfft(waves, frames)
+    noise *= 1.0 / noise.std()
+    return noise
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
@@ -89,4 +90,4 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _times_s(frames: int) -> Array:
-    return np.arange(frames) * _FRAME_S
+    return np.arange(frames, dtype=np.float64) * _FRAME_S
