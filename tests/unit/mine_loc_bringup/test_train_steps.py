@@ -26,7 +26,13 @@ def write_recording(folder: Path, name: str, person: int = 1) -> None:
     with gzip.open(folder / f"{name}_lb.txt.gz", "wt") as file:
         file.write("\n".join(lines) + "\n")
     strikes = [[k - 20, k] for k in range(BEGIN + 6, END, 50)]
-    truth = {"Subject": person, "TrialBoundaries": [BEGIN, END], "UTurnBoundaries": [1100, 1200]}
+    truth = {
+        "Subject": person,
+        "Trial": 1,
+        "Height": "170",
+        "TrialBoundaries": [BEGIN, END],
+        "UTurnBoundaries": [1100, 1200],
+    }
     feet = {"LeftFootEvents": strikes[::2], "RightFootEvents": strikes[1::2]}
     (folder / f"{name}.json").write_text(json.dumps(truth | feet))
 
@@ -34,7 +40,7 @@ def write_recording(folder: Path, name: str, person: int = 1) -> None:
 def test_a_recording_is_motion_with_its_strikes_at_the_peaks_of_it(tmp_path: Path):
     write_recording(tmp_path, "4-1", person=4)
     ((person, motion),) = marked_walks(tmp_path)
-    assert person == "4"
+    assert person == 4
     assert len(motion.strikes_s) == 24
     assert np.diff(motion.strikes_s) == pytest.approx(0.5)
     frames = np.round((motion.strikes_s + 0.065) / 0.02).astype(int)  # an eighth of a second after the rise: the peak
@@ -54,7 +60,7 @@ def test_a_model_is_written_that_loads_and_says_what_it_learnt_of(tmp_path: Path
 
 def test_a_folder_without_recordings_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["train-steps", str(tmp_path), "--out", str(tmp_path / "a.npz")]) == 2
-    assert "no recordings" in capsys.readouterr().err
+    assert "no trials" in capsys.readouterr().err
 
 
 def test_a_recording_without_strikes_is_refused_by_its_name(tmp_path: Path):
