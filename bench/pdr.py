@@ -1,9 +1,9 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap streams activity paper_b]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap shaken streams activity paper_b]
 
 Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); paper_b
-is simulated. docs/pdr.md explains the rows.
+and shaken are simulated. docs/pdr.md explains the rows.
 """
 
 import argparse
@@ -25,6 +25,7 @@ import pdr_heading
 import pdr_mounting
 import pdr_paper_b
 import pdr_recordings
+import pdr_shaken
 import pdr_steps
 import pdr_streams
 from pdr_recordings import Recording
@@ -76,6 +77,7 @@ PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "ipol": ipol,
     "oxford": oxford,
     "mobgap": mobgap,
+    "shaken": pdr_shaken.shaken,
     "streams": streams,
     "activity": pdr_activity.activity,
     "paper_b": pdr_paper_b.paper_b,
