@@ -1,9 +1,9 @@
 """Dead reckoning on recordings of waists and phones; writes bench/results/pdr.json.
 
-    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap streams activity paper_b]
+    python bench/pdr.py [--json FILE] [--only ipol oxford mobgap shaken streams activity paper_b]
 
 Needs MINE_LOC_DATA. What is learnt is learnt on the other people (ipol) or on ipol (oxford, mobgap); paper_b
-is simulated. docs/pdr.md explains the rows.
+and shaken are simulated. docs/pdr.md explains the rows.
 """
 
 import argparse
@@ -25,11 +25,17 @@ import pdr_heading
 import pdr_mounting
 import pdr_paper_b
 import pdr_recordings
+import pdr_shaken
 import pdr_steps
 import pdr_streams
-from pdr_tracks import track
+from pdr_recordings import Recording
+from pdr_step_network import held_out_weights
+from pdr_tracks import shipped_detector, track
 from rich.console import Console
 from rich.table import Column, Table
+
+from mine_loc_pdr.step_detector import NetworkStepDetector
+from mine_loc_pdr.steps import StepDetector
 
 RESULTS = Path(__file__).parent / "results" / "pdr.json"
 
@@ -37,10 +43,16 @@ RESULTS = Path(__file__).parent / "results" / "pdr.json"
 def ipol() -> dict[str, Any]:
     """Thirteen people, 10 m out, U-turn, 10 m back."""
     recordings = list(pdr_recordings.ipol())
-    tracks = [track(recording) for recording in recordings]
-    distance, stretch = pdr_distance.ipol(recordings)
+    steps, models = pdr_steps.ipol(recordings, held_out_weights(recordings))
+    detectors = {recording.name: model for recording, model in zip(recordings, models, strict=True)}
+
+    def held_out(recording: Recording) -> StepDetector:
+        return NetworkStepDetector(detectors[recording.name])
+
+    tracks = [track(recording, held_out(recording)) for recording in recordings]
+    distance, stretch = pdr_distance.ipol(recordings, held_out)
     heading = pdr_heading.ipol(recordings, tracks, stretch)
-    steps, mounting = pdr_steps.ipol(recordings, tracks), pdr_mounting.ipol(recordings)
+    mounting = pdr_mounting.ipol(recordings, held_out)
     return {"steps": steps, "heading": heading, "distance": distance, "mounting": mounting}
 
 
@@ -52,7 +64,7 @@ def oxford() -> dict[str, Any]:
 def mobgap() -> dict[str, Any]:
     """Short walks and a simulation of daily activities."""
     recordings = list(pdr_recordings.mobgap())
-    tracks = [track(recording) for recording in recordings]
+    tracks = [track(recording, shipped_detector()) for recording in recordings]
     return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
 
 
@@ -65,6 +77,7 @@ PARTS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "ipol": ipol,
     "oxford": oxford,
     "mobgap": mobgap,
+    "shaken": pdr_shaken.shaken,
     "streams": streams,
     "activity": pdr_activity.activity,
     "paper_b": pdr_paper_b.paper_b,

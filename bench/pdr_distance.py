@@ -8,8 +8,10 @@ from gait_recordings import WALKED_M, Array
 from pdr_recordings import Recording
 from pdr_tracks import HALT_S, SEARCH_S, UNKNOWN_HEIGHT_M, Track, inside, spread, track
 
+from mine_loc_pdr.steps import StepDetector
 from mine_loc_pdr.stride import PendulumStrideModel, StrideModel
 
+Detectors = Callable[[Recording], StepDetector]
 Columns = Mapping[str, Array]  # (walks, unknowns): lengths of walks that the fitted coefficients weight
 
 
@@ -22,11 +24,11 @@ def walked_m(recording: Recording, found: Track) -> float:
     return float(sum(step.length_m for step, own in zip(found.steps, mask, strict=True) if own))
 
 
-def columns(recordings: Sequence[Recording]) -> Columns:
+def columns(recordings: Sequence[Recording], detector: Detectors) -> Columns:
     """One column a coefficient: paper B's K, (1, α, β) and the pendulum's factor."""
 
     def lengths(model: Callable[[float], Any]) -> Array:
-        return np.array([walked_m(r, track(r, model(r.height_m or UNKNOWN_HEIGHT_M))) for r in recordings])
+        return np.array([walked_m(r, track(r, detector(r), model(r.height_m or UNKNOWN_HEIGHT_M))) for r in recordings])
 
     base = lengths(lambda h: StrideModel(h, 0.0, 0.0))
     return {
@@ -78,9 +80,9 @@ def stretches(recordings: Sequence[Recording], pendulum: Array) -> dict[str, flo
     return {person: float(fit(pendulum[known & (people != person)])[0]) for person in np.unique(people)}
 
 
-def ipol(recordings: Sequence[Recording]) -> tuple[dict[str, Any], dict[str, float]]:
+def ipol(recordings: Sequence[Recording], detector: Detectors) -> tuple[dict[str, Any], dict[str, float]]:
     """The figures of the people of known height; and what `stretches` says of all."""
-    tables = columns(recordings)
+    tables = columns(recordings, detector)
     known = np.array([r.height_m is not None for r in recordings])
     people = np.array([r.person for r in recordings])[known]
     cut = {name: table[known] for name, table in tables.items()}

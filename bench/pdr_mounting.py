@@ -4,7 +4,7 @@ The one learnt number, the lag of the forward acceleration, is that of the other
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from unittest.mock import patch
 
@@ -16,12 +16,13 @@ from mine_loc_core import quaternion
 from mine_loc_pdr import dead_reckoning, mounting
 from mine_loc_pdr.dead_reckoning import ImuSample, PedestrianDeadReckoning
 from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
+from mine_loc_pdr.steps import StepDetector
 from mine_loc_pdr.stride import PendulumStrideModel
 
 Steps = list[tuple[Array, Array]]  # phase (n,) and level motion (n, 3) of each step
 
 
-def gathered(recording: Recording, q: Array) -> tuple[Steps, float]:
+def gathered(recording: Recording, q: Array, detector: StepDetector) -> tuple[Steps, float]:
     """What dead reckoning hands to the finder where the sensor is turned by `q`, and the true yaw of the front."""
     steps: Steps = []
 
@@ -29,7 +30,7 @@ def gathered(recording: Recording, q: Array) -> tuple[Steps, float]:
         steps.append((phase_rad, motion_m_s2))
         return forward_push(phase_rad, motion_m_s2)
 
-    pdr = PedestrianDeadReckoning(PendulumStrideModel(1.75))
+    pdr = PedestrianDeadReckoning(PendulumStrideModel(1.75), detector=detector)
     rate, force = quaternion.rotate(q, recording.rate_rad_s), quaternion.rotate(q, recording.force_m_s2)
     with patch.object(dead_reckoning, "forward_push", keep):
         for stamp_ns, w, f in zip(recording.stamps_ns.tolist(), rate.tolist(), force.tolist(), strict=True):
@@ -59,10 +60,10 @@ def found(steps: Steps, lag: float) -> FrontEstimate | None:
     return finder.estimate()
 
 
-def ipol(recordings: Sequence[Recording]) -> dict[str, Any]:
+def ipol(recordings: Sequence[Recording], detector: Callable[[Recording], StepDetector]) -> dict[str, Any]:
     """A random rotation a recording; after the first ten steps, and after all."""
     rng = np.random.default_rng(6)
-    walks = [gathered(r, quaternion.normalise(rng.standard_normal(4))) for r in recordings]
+    walks = [gathered(r, quaternion.normalise(rng.standard_normal(4)), detector(r)) for r in recordings]
     people = np.array([r.person for r in recordings])
     lags = {p: lag_rad([w for w, own in zip(walks, people == p, strict=True) if own]) for p in np.unique(people)}
     rows: dict[str, Any] = {"lags_deg": [round(math.degrees(lag)) for lag in lags.values()]}

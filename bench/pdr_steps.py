@@ -1,4 +1,4 @@
-"""Step counts and instants: thresholds chosen on the other people, against paper B's fixed ones and a peak counter."""
+"""Step counts and instants: the network of the other people, against paper B's detector and a peak counter."""
 
 import itertools
 from collections import Counter
@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 from gait_recordings import RATE_HZ, Array
 from pdr_recordings import START_NS, Recording
-from pdr_tracks import HALT_S, SEARCH_S, TOLERANCE_S, Track, f1, inside, lags, offset_s, spread, track
+from pdr_tracks import HALT_S, SEARCH_S, TOLERANCE_S, f1, inside, lags, offset_s, shipped_detector, spread, track
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
-from mine_loc_pdr.steps import StepThresholds
+from mine_loc_pdr.step_detector import NetworkStepDetector, StepModel
+from mine_loc_pdr.step_kernel import Floats
+from mine_loc_pdr.steps import PeakStepDetector, StepThresholds
 
-GRID = tuple(
+THRESHOLDS = (0.3, 0.35, 0.4, 0.45, 0.5)  # of the network's probability
+ADAPTING_GRID = tuple(
     StepThresholds(start_peak_m_s2=start, peak_share=share, weak_peak_m_s2=weak)
     for start, share, weak in itertools.product((0.8, 1.0, 1.2), (0.1, 0.2, 0.3), (0.02, 0.04, 0.08, float("inf")))
 )
@@ -56,18 +59,18 @@ def _loss(found: Found, recordings: Sequence[Recording]) -> float:
     return float(np.mean(errors)) + 100.0 * (1.0 - f1(hits, sum(map(len, own)), sum(map(len, marked))))
 
 
-def held_out(recordings: Sequence[Recording], candidates: Mapping[Any, Found]) -> tuple[Found, dict[str, int]]:
-    """For each person the candidate that does best on the others, less the offset found on the others."""
+def held_out(recordings: Sequence[Recording], candidates: Mapping[Any, Found]) -> tuple[Found, dict[str, Any]]:
+    """For each person the candidate that does best on the others, less the offset found on the others; and which."""
     result: dict[int, Array] = {}
-    chosen: Counter[str] = Counter()
+    chosen: dict[str, Any] = {}
     for person in dict.fromkeys(r.person for r in recordings):
         others = [i for i, r in enumerate(recordings) if r.person != person]
         seen = [recordings[i] for i in others]
         best = min(candidates, key=lambda c: _loss([candidates[c][i] for i in others], seen))
-        chosen[str(best)] += 1
+        chosen[person] = best
         late = offset_s([candidates[best][i] for i in others], [r.strikes_s for r in seen])
         result |= {i: candidates[best][i] - late for i, r in enumerate(recordings) if r.person == person}
-    return [result[i] for i in range(len(recordings))], dict(chosen)
+    return [result[i] for i in range(len(recordings))], chosen
 
 
 def score(recordings: Sequence[Recording], found: Found) -> dict[str, Any]:
@@ -84,23 +87,33 @@ def score(recordings: Sequence[Recording], found: Found) -> dict[str, Any]:
     return rows
 
 
-def ipol(recordings: Sequence[Recording], tracks: Sequence[Track]) -> dict[str, Any]:
-    """Everything chosen is chosen on the other people; `shipped` uses the defaults, which were chosen on all."""
+def ipol(recordings: Sequence[Recording], weights: Mapping[str, Floats]) -> tuple[dict[str, Any], list[StepModel]]:
+    """All that is chosen or learnt comes from the other people; also the model so found for each recording.
 
-    def runs(grid: Sequence[StepThresholds]) -> dict[str, Found]:
-        return {_name(t): [track(r, thresholds=t).steps_s for r in recordings] for t in grid}
+    The one number of the threshold is chosen by how networks do that have seen the person it is for, though not those
+    that they are scored on.
+    """
 
-    ours, chosen = held_out(recordings, runs(GRID))
-    fixed, _ = held_out(recordings, runs(FIXED_GRID))
+    def peaks(grid: Sequence[StepThresholds]) -> dict[str, Found]:
+        return {_name(t): [track(r, PeakStepDetector(t)).steps_s for r in recordings] for t in grid}
+
+    tracks = {
+        t: [track(r, NetworkStepDetector(StepModel(weights[r.person], t))) for r in recordings] for t in THRESHOLDS
+    }
+    ours, best = held_out(recordings, {t: [each.steps_s for each in own] for t, own in tracks.items()})
+    latency = np.concatenate([tracks[best[r.person]][i].latency_s for i, r in enumerate(recordings)])
+    adapting, _ = held_out(recordings, peaks(ADAPTING_GRID))
+    fixed, _ = held_out(recordings, peaks(FIXED_GRID))
     counter, _ = held_out(recordings, {"": [peak_counter(r) for r in recordings]})
-    latency = np.concatenate([t.latency_s for t in tracks])
-    return score(recordings, ours) | {
-        "thresholds_chosen": chosen,
-        "shipped": score(recordings, [t.steps_s for t in tracks]),
+    rows = score(recordings, ours) | {
+        "thresholds_chosen": {str(t): count for t, count in Counter(best.values()).items()},
+        "shipped_on_people_it_learnt_of": score(recordings, [track(r, shipped_detector()).steps_s for r in recordings]),
+        "adapting_thresholds": score(recordings, adapting),
         "paper_b_fixed_thresholds": score(recordings, fixed),
         "peak_counter": score(recordings, counter),
         "latency_s": {f"p{q}": round(float(np.percentile(latency, q)), 3) for q in (50, 95, 99, 100)},
     }
+    return rows, [StepModel(weights[r.person], best[r.person]) for r in recordings]
 
 
 def _name(thresholds: StepThresholds) -> str:
@@ -109,16 +122,19 @@ def _name(thresholds: StepThresholds) -> str:
 
 
 def oxford(recordings: Sequence[Recording]) -> dict[str, Any]:
-    """Counts of the device beside; the detector as chosen on ipol."""
+    """Counts of the device beside. Phones have no gyro: the detector is the one that needs none, as chosen on ipol."""
 
     def errors(found: Callable[[Recording], Array]) -> dict[str, float]:
         return {r.name: 100.0 * (len(found(r)) - r.counted) / r.counted for r in recordings if r.counted}
 
-    ours, counter = errors(lambda r: track(r).steps_s), errors(peak_counter)
-    fixed = errors(lambda r: track(r, thresholds=replace(StepThresholds(), peak_share=0.0, **NO_WEAK)).steps_s)
+    ours, counter = errors(lambda r: track(r, PeakStepDetector()).steps_s), errors(peak_counter)
+    network = errors(lambda r: track(r, shipped_detector()).steps_s)
+    paper_b = replace(StepThresholds(), peak_share=0.0, **NO_WEAK)
+    fixed = errors(lambda r: track(r, PeakStepDetector(paper_b)).steps_s)
     return {
         "step_count_error_pct": spread(np.abs(list(ours.values()))),
         "per_file_pct": {name: round(value, 2) for name, value in ours.items()},
+        "network": {"step_count_error_pct": spread(np.abs(list(network.values())))},
         "paper_b_fixed_thresholds": {"step_count_error_pct": spread(np.abs(list(fixed.values())))},
         "peak_counter": {"step_count_error_pct": spread(np.abs(list(counter.values())))},
     }
@@ -126,7 +142,11 @@ def oxford(recordings: Sequence[Recording]) -> dict[str, Any]:
 
 def mobgap(recordings: Sequence[Recording]) -> dict[str, Any]:
     """Contacts within the reference's bouts; false steps 1 s or more outside what either reference saw as walking."""
-    return {**_mobgap(recordings, lambda r: track(r).steps_s), "peak_counter": _mobgap(recordings, peak_counter)}
+    return {
+        **_mobgap(recordings, lambda r: track(r, shipped_detector()).steps_s),
+        "adapting_thresholds": _mobgap(recordings, lambda r: track(r, PeakStepDetector()).steps_s),
+        "peak_counter": _mobgap(recordings, peak_counter),
+    }
 
 
 def _mobgap(recordings: Sequence[Recording], find: Callable[[Recording], Array]) -> dict[str, Any]:

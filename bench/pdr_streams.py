@@ -10,7 +10,7 @@ import struct
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ import psutil
 from diagnostic_msgs.msg import DiagnosticArray
 from mine_loc_interfaces.msg import Step
 from pdr_recordings import Recording
+from pdr_tracks import samples as samples_of
+from pdr_tracks import shipped_detector
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, MagneticField
 
@@ -45,7 +47,7 @@ _STAMP_AT = 4
 
 def streams(recordings: Sequence[Recording]) -> dict[str, Any]:
     """Streams of 100 Hz that one core keeps up with: the node, and its pure modules alone."""
-    samples = list(itertools.chain.from_iterable(_samples(recording) for recording in recordings))
+    samples = list(itertools.chain.from_iterable(samples_of(recording) for recording in recordings))
     names = [f"w{k:03}" for k in range(PEOPLE)]
     with tempfile.TemporaryDirectory() as folder, lent_domain() as domain:
         people = [{"name": name, "height_m": HEIGHT_M, "n100": {"port": f"/dev/{name}"}} for name in names]
@@ -54,12 +56,6 @@ def streams(recordings: Sequence[Recording]) -> dict[str, Any]:
         with running(command, domain, Path(folder) / "pdr.log") as node:
             rows = _fed(psutil.Process(node.process.pid), domain, names, samples)
     return rows | {"pure_modules_streams_per_core_100hz": _pure(samples)}
-
-
-def _samples(recording: Recording) -> Iterator[ImuSample]:
-    rows = zip(recording.stamps_ns.tolist(), recording.rate_rad_s.tolist(), recording.force_m_s2.tolist(), strict=True)
-    for stamp_ns, rate, force in rows:
-        yield ImuSample(stamp_ns, tuple(rate), tuple(force))
 
 
 def _fed(process: psutil.Process, domain: int, names: Sequence[str], samples: Sequence[ImuSample]) -> dict[str, Any]:
@@ -123,7 +119,7 @@ def _pure(samples: Sequence[ImuSample]) -> int:
     """The same for dead reckoning without node and messages, in this process."""
     taken, cpu_s = 0, 0.0
     for _ in range(3):
-        dead_reckoning = PedestrianDeadReckoning(PendulumStrideModel(HEIGHT_M))
+        dead_reckoning = PedestrianDeadReckoning(PendulumStrideModel(HEIGHT_M), detector=shipped_detector())
         started_s = time.process_time()
         for sample in samples:
             dead_reckoning.push(sample)

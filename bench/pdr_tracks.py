@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,9 @@ from pdr_recordings import START_NS, Recording
 
 from mine_loc_core.stamps import to_s
 from mine_loc_pdr.dead_reckoning import ImuSample, PedestrianDeadReckoning, StepEvent
-from mine_loc_pdr.steps import StepThresholds
+from mine_loc_pdr.step_detector import NetworkStepDetector
+from mine_loc_pdr.step_model_file import load_step_model, shipped_step_model
+from mine_loc_pdr.steps import StepDetector
 from mine_loc_pdr.stride import PendulumStrideModel, StepLengthModel
 
 TOLERANCE_S = 0.15
@@ -31,16 +33,24 @@ class Track:
     heading_rad: Array  # of the waist, unwrapped
 
 
-def track(
-    recording: Recording, model: StepLengthModel | None = None, thresholds: StepThresholds | None = None
-) -> Track:
+def samples(recording: Recording) -> Iterator[ImuSample]:
+    """In order."""
+    rows = zip(recording.stamps_ns.tolist(), recording.rate_rad_s.tolist(), recording.force_m_s2.tolist(), strict=True)
+    return (ImuSample(stamp_ns, tuple(rate), tuple(force)) for stamp_ns, rate, force in rows)
+
+
+def shipped_detector() -> NetworkStepDetector:
+    """As the node has it."""
+    return NetworkStepDetector(load_step_model(shipped_step_model())[0])
+
+
+def track(recording: Recording, detector: StepDetector, model: StepLengthModel | None = None) -> Track:
     """Push every sample, as the node does."""
     model = model or PendulumStrideModel(recording.height_m or UNKNOWN_HEIGHT_M)
-    pdr = PedestrianDeadReckoning(model, thresholds=thresholds)
+    pdr = PedestrianDeadReckoning(model, detector=detector)
     steps, latency_s, headings = [], [], []
-    rows = zip(recording.stamps_ns.tolist(), recording.rate_rad_s.tolist(), recording.force_m_s2.tolist(), strict=True)
-    for stamp_ns, rate, force in rows:
-        step = pdr.push(ImuSample(stamp_ns, tuple(rate), tuple(force)))
+    for sample in samples(recording):
+        stamp_ns, step = sample.stamp_ns, pdr.push(sample)
         if step is not None:
             steps.append(step)
             latency_s.append(to_s(stamp_ns - step.stamp_ns))

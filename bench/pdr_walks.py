@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 from gait_recordings import Array
+from pdr_tracks import shipped_detector
 
 from mine_loc_core.site import Site, load_site
 from mine_loc_core.stamps import NS_PER_S, to_ns
@@ -127,7 +128,7 @@ def _dead_reckoning(
     stamps_ns = imu.stamps_ns(START_NS, START_NS + to_ns(walker.duration_s))
     sensed = imu.sample(walker.motion(stamps_ns), np.zeros((len(stamps_ns), 3)))
     rates, forces = (values.astype(float) * FLU_TO_FRD for values in (sensed.gyro_rad_s, sensed.accel_m_s2))
-    pdr = PedestrianDeadReckoning(PendulumStrideModel(person.height_m, scale))
+    pdr = PedestrianDeadReckoning(PendulumStrideModel(person.height_m, scale), detector=shipped_detector())
     reports, bias_sd = [], 0.0
     for stamp_ns, rate, force in zip(stamps_ns.tolist(), rates.tolist(), forces.tolist(), strict=True):
         step = pdr.push(ImuSample(stamp_ns, tuple(rate), tuple(force)))

@@ -9,7 +9,7 @@ import yaml
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph.observer import Observer
 from graph.processes import node_command, running
-from graph.walker import person, write_site
+from graph.walker import ROLL_RAD_S, SWAY_M_S2, person, write_site
 from mine_loc_interfaces.msg import LandmarkFix
 from mine_loc_interfaces.srv import SetPose
 from nav_msgs.msg import Odometry
@@ -26,13 +26,16 @@ AT_A_TIME = 10  # samples: ten times as fast as life, and no queue runs over
 
 
 def imu(at_s: float, start_ns: int) -> Imu:
-    """Standing, walking with a vertical bounce, and a quarter turn to the left."""
+    """Standing, walking with the bounce, sway and roll of a pelvis, and a quarter turn to the left."""
     walking, turning = at_s > STAND_S, 0.0 <= at_s - TURN_S < TURN_TAKES_S
     message = Imu()
     message.header.stamp = to_time(start_ns + round(at_s * 1e9))
     message.angular_velocity.z = math.pi / 2.0 / TURN_TAKES_S if turning else 0.0
     bounce = 2.5 * math.sin(math.tau * STEP_HZ * at_s) if walking else 0.0
     message.linear_acceleration.z = 9.80665 + bounce
+    if walking:
+        message.linear_acceleration.y = SWAY_M_S2 * math.sin(math.pi * STEP_HZ * at_s)
+        message.angular_velocity.x = -ROLL_RAD_S * math.cos(math.pi * STEP_HZ * at_s)
     return message
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from graph.observer import Observer
 from graph.processes import node_command, running
-from graph.walker import write_site
+from graph.walker import ROLL_RAD_S, SWAY_M_S2, write_site
 from mine_loc_interfaces.msg import StrideUpdate, UwbPose
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
@@ -72,6 +72,9 @@ def imu_at(k: int) -> Imu:
     imu.header.stamp = to_time(stamp_ns(k))
     imu.linear_acceleration.y = -0.8 * math.sin(phase + FORWARD_PHASE_RAD) if walking else 0.0
     imu.linear_acceleration.z = 9.80665 + (2.5 * math.sin(phase) if walking else 0.0)
+    if walking:  # the pelvis sways and rolls once a stride
+        imu.linear_acceleration.x = SWAY_M_S2 * math.sin(0.5 * phase)
+        imu.angular_velocity.y = ROLL_RAD_S * math.cos(0.5 * phase)
     return imu
 
 

@@ -21,6 +21,7 @@ WALKER_TAG, VISITOR_TAG = 17, 18
 STANDING_S = 1.5  # before the first step
 RADIUS_M = 6.0
 STEP_HZ = 1.79
+SWAY_M_S2, ROLL_RAD_S = 1.2, 0.4  # of the pelvis, once a stride
 SPEED_M_S = 0.7 * STEP_HZ  # the stride of paper B for a person 1.75 m tall
 ROUND_PERIOD_S, SAMPLE_PERIOD_S = 0.1, 0.01
 
@@ -77,11 +78,13 @@ def imu_bytes(at_s: float, number: int) -> bytes:
     """A sample and its attitude in the device's axes (forward-right-down in north-east-down)."""
     walking = at_s > STANDING_S
     bounce = 2.5 * math.sin(math.tau * STEP_HZ * at_s) if walking else 0.0
-    rate = (0.0, 0.0, -SPEED_M_S / RADIUS_M if walking else 0.0)
+    stride = math.pi * STEP_HZ * at_s
+    sway, roll = (SWAY_M_S2 * math.sin(stride), ROLL_RAD_S * math.cos(stride)) if walking else (0.0, 0.0)
+    rate = (roll, 0.0, -SPEED_M_S / RADIUS_M if walking else 0.0)
     heading = -_angle(at_s)  # walking north at the start, turning left
     attitude = (math.cos(heading / 2.0), 0.0, 0.0, math.sin(heading / 2.0))
     ahrs = AhrsFrame(rate, (0.0, 0.0, heading % math.tau), attitude, device_us(at_s))
-    imu = ImuFrame(rate, (0.0, 0.0, -9.80665 - bounce), (200.0, 0.0, 400.0), 25.0, 101325.0, 25.0, device_us(at_s))
+    imu = ImuFrame(rate, (0.0, sway, -9.80665 - bounce), (200.0, 0.0, 400.0), 25.0, 101325.0, 25.0, device_us(at_s))
     return encode(ahrs, 2 * number % 256) + encode(imu, (2 * number + 1) % 256)
 
 

@@ -25,7 +25,7 @@ from mine_loc_pdr.drift import BIAS, HEADING, DriftModel, X, Y
 from mine_loc_pdr.magnetic_heading import MagneticHeading
 from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
 from mine_loc_pdr.rest import RestDetector
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, Step, StepDetector, StepThresholds
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, PeakStepDetector, Step, StepDetector
 from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2
 
 INITIAL_SPAN_NS = 500 * NS_PER_MS  # of force averaged for the first horizon
@@ -97,12 +97,15 @@ class PedestrianDeadReckoning:
         self,
         stride: StepLengthModel,
         forward_imu: Vector3 = (1.0, 0.0, 0.0),
-        thresholds: StepThresholds | None = None,
+        detector: StepDetector | None = None,
     ) -> None:
-        """`forward_imu`: the unit vector in the IMU's axes that points to the front of the body."""
+        """`forward_imu`: the unit vector in the IMU's axes that points to the front of the body.
+
+        `detector`: paper B's if none is given.
+        """
         self._stride = stride
         self._forward_imu = forward_imu
-        self._detector = StepDetector(thresholds)
+        self._detector = detector or PeakStepDetector()
         self._rest = RestDetector()
         self._drift = DriftModel(stride.scale_variance)
         self._attitude: AttitudeFilter | None = None
@@ -232,9 +235,7 @@ class PedestrianDeadReckoning:
         if resting_rate := self._rest.push(dt_s, sample.rate_rad_s, sample.force_m_s2):
             self._learn_bias(attitude, resting_rate)
         self._remember(sample, attitude.orientation_imu)
-        (ux, uy, uz), (fx, fy, fz) = attitude.up_imu, sample.force_m_s2
-        vertical = ux * fx + uy * fy + uz * fz - STANDARD_GRAVITY_M_S2
-        step = self._detector.push(sample.stamp_ns, vertical)
+        step = self._detector.push(sample.stamp_ns, attitude.motion(sample.rate_rad_s, sample.force_m_s2))
         return None if step is None else self._walk(attitude, step)
 
     def _remember(self, sample: ImuSample, orientation: Quaternion) -> None:
@@ -321,4 +322,7 @@ def _levelled(force_m_s2: NDArray[np.float64], facing: NDArray[np.float64]) -> N
 
 def _clipped(before: Vector3, now: Vector3) -> float:
     """The largest turn rate in rad/s that stands at a limit, 0 if none does."""
+    x, y, z = now
+    if abs(x) < SATURATION_RAD_S and abs(y) < SATURATION_RAD_S and abs(z) < SATURATION_RAD_S:
+        return 0.0  # of nearly every sample
     return max(abs(b) if a == b and abs(b) >= SATURATION_RAD_S else 0.0 for a, b in zip(before, now, strict=True))

@@ -38,6 +38,15 @@ class PdrParameters(NodeParameters):
         choices=("walking", "stated"),
     )
     odometry_rate: float = parameter(10.0, "of <person>/odometry and /tf", unit="Hz", low=0.1, high=200.0)
+    step_detector: str = parameter(
+        "network",
+        "a trained network, or paper B's peaks and valleys for devices without a gyro",
+        choices=("network", "peaks"),
+        read_only=True,
+    )
+    step_model: str = parameter(
+        "", "file written by mine-loc train-steps; empty = the one that is shipped", read_only=True
+    )
     activity_model: str = parameter(
         "", "file written by mine-loc train-activity; empty = the one that is shipped", read_only=True
     )

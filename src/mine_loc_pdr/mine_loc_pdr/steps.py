@@ -1,4 +1,4 @@
-"""Step detection on the vertical acceleration of the waist (paper B, section 2.2.1).
+"""Step detection on the vertical acceleration of the waist (paper B, section 2.2.1), and what a step is.
 
 A causal moving median takes out spikes and two moving means the knocks of the heel; a step is an adjacent peak and
 valley, both past their thresholds, with exactly one zero crossing between them. The thresholds follow the person: they
@@ -13,8 +13,13 @@ import math
 from bisect import bisect_left, insort
 from collections import deque
 from dataclasses import dataclass
+from typing import Protocol, TypeAlias
 
 from mine_loc_core.stamps import NS_PER_MS, to_s
+
+Motion: TypeAlias = tuple[float, float, float, float, float, float]
+"""Acceleration without gravity (m/s²) upwards and along two level directions that turn with the waist, the second a
+quarter turn left of the first; the turn rate (rad/s) about the vertical and about these two."""
 
 MEDIAN_WINDOW_NS = 75 * NS_PER_MS
 MEAN_WINDOW_NS = 120 * NS_PER_MS
@@ -57,19 +62,24 @@ class StepThresholds:
 class Step:
     """One step: `stamp_ns` is the heel strike, `interval_s` the time since the step before, None after standing.
 
-    `peak_m_s2` and `swing_m_s2` are of the smoothed vertical acceleration: its peak, and the way from the deepest
-    valley since the step before to this peak.
+    `swing_m_s2` is of the smoothed vertical acceleration: the way from the deepest valley since the step before to the
+    peak. `confidence` is the probability that this was a step.
     """
 
     stamp_ns: int
     interval_s: float | None
-    peak_m_s2: float
     swing_m_s2: float
+    confidence: float
 
-    @property
-    def confidence(self) -> float:
-        """Probability that this was a step: logistic in the peak, fitted on people 1 to 7 of ipol_gait_lowerback."""
-        return 1.0 / (1.0 + math.exp(0.7 - 2.8 * self.peak_m_s2))
+
+class StepDetector(Protocol):
+    """Takes the motion of one person's waist sample by sample and reports steps as they are seen."""
+
+    def push(self, stamp_ns: int, motion: Motion) -> Step | None:
+        """Take one sample, whose stamp is later than the last one's; return the step it completes, if any."""
+
+    def reset(self) -> None:
+        """Start afresh, after a gap in the data."""
 
 
 class MovingMedian:
@@ -108,10 +118,10 @@ class MovingMean:
         return (samples[0][0] + stamp_ns) // 2, self._sum / len(samples)
 
 
-class StepDetector:
-    """Takes the vertical acceleration sample by sample and reports steps as they are seen.
+class PeakStepDetector:
+    """Paper B's detector, which needs no gyro: of the motion it takes the vertical acceleration alone.
 
-    Stamps must increase. An offset of the accelerometer is removed by a slow mean.
+    An offset of the accelerometer is removed by a slow mean.
     """
 
     def __init__(self, thresholds: StepThresholds | None = None) -> None:
@@ -132,9 +142,9 @@ class StepDetector:
         self._usual_peak_m_s2 = 0.0
         self._usual_interval_s = _FIRST_INTERVAL_S
 
-    def push(self, stamp_ns: int, vertical_m_s2: float) -> Step | None:
-        """Take one sample, upwards positive and without gravity; return the step it completes, if any."""
-        middle_ns, value = stamp_ns, self._without_offset(stamp_ns, vertical_m_s2)
+    def push(self, stamp_ns: int, motion: Motion) -> Step | None:
+        """See StepDetector."""
+        middle_ns, value = stamp_ns, self._without_offset(stamp_ns, motion[0])
         for smooth in self._filters:
             middle_ns, value = smooth.push(middle_ns, value)
         if value > 0.0:
@@ -206,4 +216,9 @@ class StepDetector:
     def _step(self, stamp_ns: int, interval_s: float | None) -> Step:
         self._last_step_ns = stamp_ns
         swing_m_s2, self._valley_m_s2 = self._peak_m_s2 - self._valley_m_s2, 0.0
-        return Step(stamp_ns, interval_s, self._peak_m_s2, swing_m_s2)
+        return Step(stamp_ns, interval_s, swing_m_s2, _confidence(self._peak_m_s2))
+
+
+def _confidence(peak_m_s2: float) -> float:
+    """Logistic in the peak, fitted on people 1 to 7 of ipol_gait_lowerback."""
+    return 1.0 / (1.0 + math.exp(0.7 - 2.8 * peak_m_s2))

@@ -25,8 +25,12 @@ def bag_of_a_walk(path: Path, *, seconds: float, person: str = "ann") -> Path:
         message = Imu()
         stamp_ns = 10**18 + k * PERIOD_NS
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-        up = 2.5 * math.sin(2 * math.pi * 1.8 * t) if 0.0 < t < seconds else 0.0
-        message.linear_acceleration.z = 9.80665 + up
+        phase = 2 * math.pi * 1.8 * t
+        message.linear_acceleration.z = 9.80665
+        if 0.0 < t < seconds:  # the pelvis bounces once a step, sways and rolls once a stride
+            message.linear_acceleration.z += 2.5 * math.sin(phase)
+            message.linear_acceleration.y = 1.2 * math.sin(0.5 * phase)
+            message.angular_velocity.x = -0.4 * math.cos(0.5 * phase)
         writer.write(f"{person}/imu/data", Imu, stamp_ns, serialize_message(message))
     writer.close()
     return path
@@ -50,7 +54,7 @@ def test_the_printed_line_gives_the_walk_its_length(tmp_path: Path, site: Path, 
     (ann,) = load_people(site)
     gain = (math.sin(math.pi * 1.8 * 0.12) / (math.pi * 1.8 * 0.12)) ** 2
     usual_m = PendulumStrideModel(1.7, ann.stride.k).length_m(1.8, 5.0 * gain)
-    assert 36 * usual_m == pytest.approx(20.0, rel=0.03)
+    assert 35 * usual_m == pytest.approx(20.0, rel=0.03)  # the last bounce is cut off, no strike follows
 
 
 def test_a_longer_walk_in_as_many_steps_gives_a_greater_scale(

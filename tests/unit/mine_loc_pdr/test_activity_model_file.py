@@ -9,7 +9,8 @@ import pytest
 from activity_samples import window
 
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_pdr.activity_model_file import MOST_BYTES, load_model, save_model, shipped_model
+from mine_loc_pdr.activity_model_file import load_model, save_model, shipped_model
+from mine_loc_pdr.model_file import MOST_BYTES
 
 
 @pytest.fixture

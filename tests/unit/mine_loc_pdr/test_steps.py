@@ -1,4 +1,4 @@
-"""Step detection: one step a peak and valley, none while standing, soon after the heel strike."""
+"""Paper B's step detection: one step a peak and valley, none while standing, soon after the heel strike."""
 
 import itertools
 import math
@@ -11,14 +11,18 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMean, MovingMedian, Step, StepDetector, StepThresholds
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, MovingMean, MovingMedian, PeakStepDetector, StepThresholds
 
 
 def detect(values, rate_hz=100, detector=None, start_ns=10**18):
     """(stamp of the sample, step) of each step in `values` sampled at rate_hz."""
-    detector = detector or StepDetector()
+    detector = detector or PeakStepDetector()
     stamps = [start_ns + k * NS_PER_S // rate_hz for k in range(len(values))]
-    return [(t, s) for t, v in zip(stamps, values, strict=True) if (s := detector.push(t, float(v)))]
+    return [
+        (t, s)
+        for t, v in zip(stamps, values, strict=True)
+        if (s := detector.push(t, (float(v), 0.0, 0.0, 0.0, 0.0, 0.0)))
+    ]
 
 
 def walk(seconds, step_hz=1.8, rate_hz=100, amplitude=2.5):
@@ -100,8 +104,8 @@ def test_two_zero_crossings_between_peak_and_valley_are_no_step():
     up = np.concatenate((valley, -valley))
     wiggle = np.concatenate((np.full(30, -0.02), np.full(30, 0.02)))
     deep = StepThresholds(valley_m_s2=0.05)  # the valley that the wiggle does not reach
-    assert len(detect(np.concatenate((up, valley)), detector=StepDetector(deep))) == 1
-    assert detect(np.concatenate((up, wiggle, valley)), detector=StepDetector(deep)) == []
+    assert len(detect(np.concatenate((up, valley)), detector=PeakStepDetector(deep))) == 1
+    assert detect(np.concatenate((up, wiggle, valley)), detector=PeakStepDetector(deep)) == []
 
 
 def test_the_first_step_after_standing_has_no_interval():
@@ -149,14 +153,14 @@ def test_a_long_lift_is_no_step():
 
 
 def test_reset_forgets_the_walk():
-    detector = StepDetector()
+    detector = PeakStepDetector()
     detect(walk(3), detector=detector)
     detector.reset()
     assert detect(walk(3), detector=detector, start_ns=2 * 10**18)[0][1].interval_s is None
 
 
 def test_confidence_is_a_probability_that_grows_with_the_peak():
-    weak, strong = Step(0, 0.5, 0.5, 1.0), Step(0, 0.5, 3.0, 6.0)
+    weak, strong = (detect(walk(10, amplitude=amplitude))[-1][1] for amplitude in (1.3, 4.0))
     assert 0.5 < weak.confidence < strong.confidence < 1.0
 
 

@@ -21,6 +21,8 @@ from rich.table import Table
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import Person, load_people
 from mine_loc_pdr.dead_reckoning import PedestrianDeadReckoning
+from mine_loc_pdr.step_detector import NetworkStepDetector
+from mine_loc_pdr.step_model_file import load_step_model, shipped_step_model
 from mine_loc_pdr.stride import stride_model
 from mine_loc_pdr.stride_calibration import StrideCalibration, calibrate_scale
 
@@ -77,7 +79,8 @@ def _modelled(bag: Path, person: Person) -> tuple[int, float]:
     """Steps in a bag and their length with k = 1."""
     from mine_loc_bringup.walk_bag import read_walk  # noqa: PLC0415 rosbags is slow to load
 
-    pdr = PedestrianDeadReckoning(stride_model(person))
+    model, _ = load_step_model(shipped_step_model())
+    pdr = PedestrianDeadReckoning(stride_model(person), detector=NetworkStepDetector(model))
     lengths_m = [step.length_m for sample in read_walk(bag, person.name) if (step := pdr.push(sample)) is not None]
     if len(lengths_m) < _FEWEST_STEPS:
         raise ConfigurationError(f"{bag}: {len(lengths_m)} steps found; allowed: a walk of {_FEWEST_STEPS} or more")

@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,9 @@ from mine_loc_pdr.parameters import PdrParameters
 from mine_loc_pdr.plane_follower import PlaneFollower
 from mine_loc_pdr.pseudo_plane import PseudoPlane
 from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
+from mine_loc_pdr.step_detector import NetworkStepDetector, StepModel
+from mine_loc_pdr.step_model_file import load_step_model, shipped_step_model
+from mine_loc_pdr.steps import PeakStepDetector, StepDetector
 from mine_loc_pdr.stride import stride_model
 from mine_loc_pdr.stride_refinement import Fix, StrideRefiner, StrideScale
 
@@ -45,14 +49,26 @@ _SILENT_S = 1.0
 _FLAT_VARIANCE = 1e6  # z, roll and pitch: dead reckoning on the plane says nothing about them
 
 
+@dataclass(frozen=True, slots=True)
+class Models:
+    """What all tracks share: how to recognise activities and steps, these by paper B where `steps` is None."""
+
+    activities: ActivityModel
+    steps: StepModel | None
+
+    def step_detector(self) -> StepDetector:
+        """A detector for one track."""
+        return PeakStepDetector() if self.steps is None else NetworkStepDetector(self.steps)
+
+
 class Track:
     """One person's dead reckoning and the ends of its topics."""
 
-    def __init__(self, person: Person, n100: N100, activities: ActivityModel, site: Site, heard_ns: int) -> None:
+    def __init__(self, person: Person, n100: N100, models: Models, site: Site, heard_ns: int) -> None:
         self.person = person
         self._n100 = n100
         self.entities: list[Any] = []  # what is released with the track
-        self._activities = activities
+        self._models = models
         self._site = site
         self.odometry: Any = None
         self.heard_ns = heard_ns
@@ -65,9 +81,9 @@ class Track:
         mounting = quaternion.from_euler_zyx(*self._n100.mounting_rpy_rad)
         x, y, z = quaternion.rotate(quaternion.conjugate(mounting), (1.0, 0.0, 0.0))
         stride = stride_model(self.person)
-        self.pdr = PedestrianDeadReckoning(stride, (float(x), float(y), float(z)))
+        self.pdr = PedestrianDeadReckoning(stride, (float(x), float(y), float(z)), self._models.step_detector())
         self.refiner = StrideRefiner(stride.scale, stride.scale_variance)
-        self._recogniser = ActivityRecogniser(self._activities)
+        self._recogniser = ActivityRecogniser(self._models.activities)
         area = WalkableArea.of(self._site)
         self.plane = PlaneFollower(
             PseudoPlane(self._site.turn_markers), None if area is None else GalleryConstraint(area)
@@ -92,8 +108,7 @@ class Pdr(NodeBase):
         self._tracks: dict[str, Track] = {}
         self._site = load_site(Path(self.parameters.site))
         self._file = PeopleFile(Path(self.parameters.site))
-        model = self.parameters.activity_model
-        self._activity_model, _ = load_model(Path(model) if model else shipped_model())
+        self._models = Models(self._activity_model(), self._step_model())
         self._activities = self.publish_to(ActivityMessage, "pdr/activity", EVENTS)
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
         self._strides = self.publish_to(StrideUpdate, "pdr/stride_updates", EVENTS)
@@ -107,6 +122,16 @@ class Pdr(NodeBase):
         self.every(_MOUNTING_PERIOD_S, self._publish_mountings)
         self.serve(Reset, "~/reset", self._reset)
         self.serve(SetPose, "~/set_pose", self._set_pose)
+
+    def _activity_model(self) -> ActivityModel:
+        file = self.parameters.activity_model
+        return load_model(Path(file) if file else shipped_model())[0]
+
+    def _step_model(self) -> StepModel | None:
+        file = self.parameters.step_model
+        if self.parameters.step_detector == "peaks":
+            return None
+        return load_step_model(Path(file) if file else shipped_step_model())[0]
 
     def parameters_changed(self) -> None:
         """Work out the period of the odometry."""
@@ -135,7 +160,7 @@ class Pdr(NodeBase):
                 self._tracks[name] = self._new_track(person, person.n100)
 
     def _new_track(self, person: Person, n100: N100) -> Track:
-        track = Track(person, n100, self._activity_model, self._site, self.steady_ns())
+        track = Track(person, n100, self._models, self._site, self.steady_ns())
         track.odometry = self.publish_to(Odometry, f"/{person.name}/odometry", EVENTS)
         name = f"/{person.name}/imu"
         imu = self.subscribe(Imu, f"{name}/data", lambda message: self._on_imu(track, message), STREAM, raw=True)
