@@ -53,7 +53,9 @@ class AreaWatch:
     def _bits(self, poses: Sequence[Pose]) -> list[tuple[int, int]]:
         """For each pose the areas it is inside of, and those within the margin, as bits."""
         points_m = np.array([(pose.x_m, pose.y_m) for pose in poses], dtype=float).reshape(-1, 2)
-        outside_m = np.array([shape.outside_m(points_m) for shape in self._shapes]).reshape(-1, len(poses)).T
+        outside_m = (
+            np.array([shape.outside_m(points_m) for shape in self._shapes]).reshape(len(self._shapes), len(poses)).T
+        )
         inside, near = (np.packbits(outside_m <= limit, axis=1, bitorder="little") for limit in (0.0, self._margin_m))
         return [
             (int.from_bytes(a.tobytes(), "little"), int.from_bytes(b.tobytes(), "little"))

@@ -69,8 +69,8 @@ def _fix(connection: Connection, person: Row[tuple[int, str]], at_ns: int, max_a
     age_s = to_s(at_ns - shown.stamp_ns)
     lost = nowhere or at_ns - row.stamp_ns > to_ns(max_age_s + row.span_s)
     areas = tuple(shown.place.split()) if known else ()
-    where = (shown.x_m, shown.y_m, shown.z_m, shown.ce95_m) if known else (None,) * 4
-    return Fix(person.name, shown.stamp_ns, age_s, *where, Mode(row.mode), areas, lost)
+    x_m, y_m, z_m, ce95_m = (shown.x_m, shown.y_m, shown.z_m, shown.ce95_m) if known else (None,) * 4
+    return Fix(person.name, shown.stamp_ns, age_s, x_m, y_m, z_m, ce95_m, Mode(row.mode), areas, lost)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +99,14 @@ def track(connection: Connection, person: str, from_ns: int, to_ns_: int) -> Ite
         raise ConfigurationError(f"{person!r}: nobody of this name is in the store; allowed: {_names(connection)}")
     columns = [_poses.c[name] for name in ("stamp_ns", "x_m", "y_m", "z_m", "ce95_m", "mode")]
     asked = (
-        select(*columns, _places.c.name, _poses.c.span_s)
+        select(*columns, _places.c.name.label("place"), _poses.c.span_s)
         .join_from(_poses, _places)
         .where(_poses.c.person_id == found, _poses.c.stamp_ns.between(from_ns, to_ns_))
         .order_by(_poses.c.stamp_ns)
     )
-    for *fields, mode, place, span_s in connection.execution_options(yield_per=10_000).execute(asked):
-        yield TrackPoint(*fields, Mode(mode), tuple(place.split()), span_s)
+    for row in connection.execute(asked):
+        where = (row.x_m, row.y_m, row.z_m, row.ce95_m)
+        yield TrackPoint(row.stamp_ns, *where, Mode(row.mode), tuple(row.place.split()), row.span_s)
 
 
 @dataclass(frozen=True, slots=True)

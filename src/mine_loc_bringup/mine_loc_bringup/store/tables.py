@@ -1,7 +1,7 @@
 """The one schema of the store, for SQLite and PostgreSQL; docs/store.md describes it, `migrations` builds it.
 
-Names of people and sets of areas are kept once and numbered. The poses' key leads with the person, so that the last pose
-before an instant is one step down an index; all else is read by time.
+Names of people and sets of areas are kept once and numbered. The poses' key leads with the person, so that the last
+pose before an instant is one step down an index; all else is read by time.
 """
 
 from sqlalchemy import (

@@ -15,6 +15,10 @@ def _id(name: str, kind: type[sa.Integer] = sa.BigInteger) -> sa.Column[int]:
     return sa.Column(name, kind, nullable=False, autoincrement=False)
 
 
+def _reference(table: str, name: str) -> sa.Column[int]:
+    return sa.Column(name, sa.Integer, sa.ForeignKey(f"{table}.id"), nullable=False, autoincrement=False)
+
+
 def upgrade() -> None:
     """Build it."""
     for name in ("people", "areas", "places"):
@@ -23,29 +27,30 @@ def upgrade() -> None:
             sa.Column("id", sa.Integer, primary_key=True),
             sa.Column("name", sa.String, nullable=False, unique=True),
         )
-    person = sa.Column("person_id", sa.Integer, sa.ForeignKey("people.id"), nullable=False, autoincrement=False)
-    area = sa.Column("area_id", sa.Integer, sa.ForeignKey("areas.id"), nullable=False, autoincrement=False)
-    place = sa.Column("place_id", sa.Integer, sa.ForeignKey("places.id"), nullable=False, autoincrement=False)
-    span = sa.Column("span_s", sa.SmallInteger, nullable=False)
-    op.create_table("place_areas", place, area, sa.PrimaryKeyConstraint("place_id", "area_id"))
+    op.create_table(
+        "place_areas",
+        _reference("places", "place_id"),
+        _reference("areas", "area_id"),
+        sa.PrimaryKeyConstraint("place_id", "area_id"),
+    )
     op.create_table(
         "poses",
-        person.copy(),
+        _reference("people", "person_id"),
         _id("stamp_ns"),
         *_numbers("x_m", "y_m", "z_m", "yaw_rad", "variance_x_m2", "covariance_xy_m2", "variance_y_m2"),
         *_numbers("velocity_x_m_s", "velocity_y_m_s", "ce95_m"),
         sa.Column("mode", sa.SmallInteger, nullable=False),
         *_numbers("since_uwb_s"),
-        place.copy(),
-        span.copy(),
+        _reference("places", "place_id"),
+        sa.Column("span_s", sa.SmallInteger, nullable=False),
         sa.PrimaryKeyConstraint("person_id", "stamp_ns"),
         sqlite_with_rowid=False,
     )
     op.create_table(
         "zone_events",
         _id("stamp_ns"),
-        person.copy(),
-        area.copy(),
+        _reference("people", "person_id"),
+        _reference("areas", "area_id"),
         sa.Column("event", sa.String, nullable=False),
         *_numbers("dwell_s"),
         sa.PrimaryKeyConstraint("stamp_ns", "person_id", "area_id", "event"),
@@ -60,14 +65,14 @@ def upgrade() -> None:
         sa.Column("status", sa.SmallInteger, nullable=False),
         _id("last_heard_ns"),
         sa.Column("galleries", sa.String, nullable=False),
-        span.copy(),
+        sa.Column("span_s", sa.SmallInteger, nullable=False),
         sa.PrimaryKeyConstraint("stamp_ns", "region_id"),
         sqlite_with_rowid=False,
     )
     op.create_table(
         "alarms",
         _id("stamp_ns"),
-        person.copy(),
+        _reference("people", "person_id"),
         sa.Column("zone", sa.String, nullable=False),
         _id("level", sa.SmallInteger),
         sa.Column("latched", sa.Boolean, nullable=False),
@@ -81,7 +86,7 @@ def upgrade() -> None:
         _id("reporter_id"),
         sa.Column("ranges", sa.SmallInteger, nullable=False),
         *_numbers("los_fraction", "shortest_m", "longest_m"),
-        span.copy(),
+        sa.Column("span_s", sa.SmallInteger, nullable=False),
         sa.PrimaryKeyConstraint("stamp_ns", "tag_id", "reporter_id"),
         sqlite_with_rowid=False,
     )
