@@ -125,13 +125,12 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    chance, wrong, runs = random.Random(arguments.seed), 0, []
+    chance, wrong = random.Random(arguments.seed), 0
     with lent_domain() as domain, tempfile.TemporaryDirectory() as folder:
         observer = Observer(domain)
         kills = Kills(Path(folder), observer, domain)
         kills.recover()  # makes the file
-        for number in range(arguments.kills):
-            runs.append(kills.kill(after_s=chance.uniform(0.3, 2.5), locked=number % 3 == 2))
+        runs = [kills.kill(after_s=chance.uniform(0.3, 2.5), locked=n % 3 == 2) for n in range(arguments.kills)]
         kills.recover()
         for number, killed in enumerate(runs, 1):
             problems = kills.look(killed)

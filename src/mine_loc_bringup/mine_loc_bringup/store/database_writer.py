@@ -1,6 +1,6 @@
 """Batches into the database, each in one transaction, each once."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from sqlalchemy import Connection, Engine, Insert, Table, select, update
@@ -14,6 +14,8 @@ from mine_loc_bringup.store.keeper import DatabaseUnavailableError
 from mine_loc_bringup.store.records import Record
 
 _THINNED = {"poses", "regions", "range_rounds"}
+_REFUSALS = (DataError, IntegrityError, OverflowError)
+_Inserting = Callable[[Connection, Table, list[dict[str, Any]]], None]
 
 
 class DatabaseWriter:
@@ -29,15 +31,13 @@ class DatabaseWriter:
 
     def write(self, batch: Batch, now_ns: int) -> None:
         """Write and commit; a batch that is there already is left. Raises DatabaseUnavailableError."""
-        known, refused = dict(self._ids), self.refused
         try:
             self.prepare()
-            with self._engine.begin() as connection:
-                if self._begin(connection, batch, now_ns):
-                    for name, records in batch.rows.items():
-                        self._insert(connection, tables.METADATA.tables[name], self._values(connection, name, records))
+            try:
+                self._write(batch, now_ns, _together)
+            except _REFUSALS:
+                self._write(batch, now_ns, self._one_by_one)
         except (SQLAlchemyError, OSError) as error:
-            self._ids, self.refused = known, refused  # numbers that were given out are rolled back with the rest
             raise DatabaseUnavailableError(reason(error)) from error
 
     def prepare(self) -> None:
@@ -45,6 +45,17 @@ class DatabaseWriter:
         if not self._migrated:
             migrate(self._engine)
             self._migrated = True
+
+    def _write(self, batch: Batch, now_ns: int, insert: _Inserting) -> None:
+        known, refused = dict(self._ids), self.refused
+        try:
+            with self._engine.begin() as connection:
+                if self._begin(connection, batch, now_ns):
+                    for name, records in batch.rows.items():
+                        insert(connection, tables.METADATA.tables[name], self._values(connection, name, records))
+        except BaseException:
+            self._ids, self.refused = known, refused  # numbers that were given out are rolled back with the rest
+            raise
 
     def _begin(self, connection: Connection, batch: Batch, now_ns: int) -> bool:
         table = tables.writers
@@ -74,19 +85,15 @@ class DatabaseWriter:
                 row["span_s"] = 0
         return rows
 
-    def _insert(self, connection: Connection, table: Table, rows: list[dict[str, Any]]) -> None:
-        statement = _unless_there(connection, table)
-        try:
-            with connection.begin_nested():
-                connection.execute(statement, rows)
-        except (DataError, IntegrityError, OverflowError):
-            for row in rows:  # one that cannot be stored must not keep out those that can
-                try:
-                    with connection.begin_nested():
-                        connection.execute(statement, row)
-                except (DataError, IntegrityError, OverflowError) as error:
-                    self.refused += 1
-                    self.last_refusal = f"{table.name}: {getattr(error, 'orig', error)}"
+    def _one_by_one(self, connection: Connection, table: Table, rows: list[dict[str, Any]]) -> None:
+        """One that cannot be stored must not keep out those that can."""
+        for row in rows:
+            try:
+                with connection.begin_nested():
+                    _together(connection, table, [row])
+            except _REFUSALS as error:
+                self.refused += 1
+                self.last_refusal = f"{table.name}: {reason(error)}"
 
     def _number_places(self, connection: Connection, places: Iterable[tuple[str, ...]]) -> None:
         new = {" ".join(place): place for place in places if (tables.places, " ".join(place)) not in self._ids}
@@ -98,13 +105,17 @@ class DatabaseWriter:
             for area in place
         ]
         if pairs:
-            connection.execute(_unless_there(connection, tables.place_areas), pairs)
+            _together(connection, tables.place_areas, pairs)
 
     def _number(self, connection: Connection, table: Table, names: Iterable[str]) -> None:
         for name in sorted({name for name in names if (table, name) not in self._ids}):
             connection.execute(_unless_there(connection, table), {"name": name})
             number = connection.scalar(select(table.c.id).where(table.c.name == name))
             self._ids[table, name] = int(number or 0)
+
+
+def _together(connection: Connection, table: Table, rows: list[dict[str, Any]]) -> None:
+    connection.execute(_unless_there(connection, table), rows)
 
 
 def _unless_there(connection: Connection, table: Table) -> Insert:
