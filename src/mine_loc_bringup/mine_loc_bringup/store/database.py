@@ -17,7 +17,7 @@ from mine_loc_core.errors import ConfigurationError
 
 DEFAULT_VARIABLE = "MINE_LOC_DATABASE"
 _ALLOWED = "sqlite:///FILE or postgresql://USER@HOST/DATABASE"
-_BUSY_S, _PATIENT_S = 0.5, 60.0
+_BUSY_S, _PATIENT_S = 0.2, 60.0
 _ANSWER_MS = 5000
 _MIGRATING = 0x6D6C6F63  # key of the advisory lock, "mloc"
 
@@ -56,7 +56,7 @@ def spool_file(url: URL) -> Path:
 def open_engine(url: URL, *, writing: bool, patient: bool = False) -> Engine:
     """An engine whose commits are on the disk when they return. Nothing is opened before the first use.
 
-    One that is not `patient` waits half a second for a lock, and five for PostgreSQL, and then raises.
+    One that is not `patient` waits 0.2 s for a lock, and five seconds for PostgreSQL, and then raises.
     """
     if url.get_backend_name() == "postgresql":
         limit = {} if patient else {"options": f"-c statement_timeout={_ANSWER_MS}", "tcp_user_timeout": _ANSWER_MS}

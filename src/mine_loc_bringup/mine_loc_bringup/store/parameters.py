@@ -22,7 +22,7 @@ class StoreParameters(NodeParameters):
     )
     spool_mb: int = parameter(64, "room reserved for the spool", unit="MB", low=1, high=4096, read_only=True)
     flush_s: float = parameter(
-        0.5, "how often rows are written; a crash loses as much", unit="s", low=0.05, high=1.0, read_only=True
+        0.5, "how often rows are written; a crash loses as much", unit="s", low=0.05, high=0.7, read_only=True
     )
     memory_rows: int = parameter(
         200_000, "rows that wait in memory at most", unit="1", low=1000, high=10_000_000, read_only=True
