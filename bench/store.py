@@ -3,9 +3,10 @@ bench/results/store.json.
 
     python bench/store.py [--rows 10000000] [--json FILE] [--database URL]
 
-Rows are made up with a fixed seed: 100 people go from area to area every ten minutes, a row a second each. Without --database the store is a SQLite file in the folder for temporary files; with it, an
-empty PostgreSQL database. Costs are processor time of this process, medians of several runs with the smallest and the
-largest; times of questions are wall time.
+Rows are made up with a fixed seed: 100 people go from area to area every ten minutes, a row a second each. Without
+--database the store is a SQLite file in the folder for temporary files; with it, an empty PostgreSQL database. Costs
+are processor time of this process, medians of several runs with the smallest and the largest; times of questions are
+wall time.
 """
 
 import argparse

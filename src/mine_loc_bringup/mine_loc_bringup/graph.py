@@ -113,7 +113,7 @@ def expand(
             parameter_file=files.get(spec.key),
         )
         for spec in graph
-        if spec.per != "site_with_params" or spec.key in files
+        if spec.per != "site_with_params" or spec.key in files or spec.key in only
         for scope in _scopes(spec, site, people)
     ]
     allowed = dict.fromkeys([spec.key for spec in graph] + [process.name for process in processes])

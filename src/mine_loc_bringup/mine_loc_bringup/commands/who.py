@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     at_ns = parse_moment(arguments.at, "--at")
     with asked(arguments.database) as connection:
         fixes = who(connection, at_ns, arguments.max_age, arguments.zone)
-    table = Table("person", "", "place", "x [m]", "y [m]", "95 % [m]", "fix at", "age [s]", title=moment_text(at_ns))
+    table = Table("person", "", "place", "x, m", "y, m", "95 %, m", "fix at", "age, s", title=moment_text(at_ns))
     for fix in fixes:
         state = "[bold red]LOST[/]" if fix.lost else fix.mode.name
         place = f"{'last in ' if fix.lost and fix.areas else ''}{', '.join(fix.areas) or '–'}"

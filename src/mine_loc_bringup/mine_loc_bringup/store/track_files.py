@@ -79,7 +79,7 @@ def write_plot(file: Path, person: str, points: Sequence[TrackPoint]) -> None:
 
 def stretches_table(person: str, points: Sequence[TrackPoint]) -> Table:
     """When the person was in which areas; LOST where nobody can say."""
-    table = Table("from", "to", "for [s]", "place", title=person)
+    table = Table("from", "to", "for, s", "place", title=person)
     for place, group in groupby(points, lambda p: (", ".join(p.areas) or "–") if p.placed else "[bold red]LOST[/]"):
         run = list(group)
         start_ns, end_ns = run[0].stamp_ns, run[-1].stamp_ns
