@@ -51,6 +51,21 @@ def test_the_migrations_build_the_schema_that_is_written(store):
         assert compare_metadata(MigrationContext.configure(connection), tables.METADATA) == []
 
 
+def test_a_schema_of_a_later_version_is_left_alone_and_rows_wait(store):
+    migrate(store.engine)
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '9999'")
+    store.keep([pose(0.0)])
+    assert store.keeper.database_problem == "Can't locate revision identified by '9999'"
+    assert store.keeper.counts.acknowledged == store.keeper.counts.spooled == 1
+    with pytest.raises(ConfigurationError, match="schema 9999; allowed: 0001"), asked(store.url):
+        pass
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0001'")
+    store.keep()
+    assert store.count() == 1
+
+
 def test_every_kind_of_row_comes_back_as_it_was(store):
     tag = 2**64 - 2
     store.keep(

@@ -89,6 +89,18 @@ def test_with_database_and_spool_down_rows_wait_in_memory_and_what_is_too_much_i
     assert (keeper.counts.acknowledged, keeper.spool_problem, keeper.waiting) == (6, "", 0)
 
 
+def test_a_batch_stays_when_something_unforeseen_happens(tmp_path):
+    keeper = keeper_on(tmp_path, database := FakeDatabase())
+    keeper.put(pose(n) for n in range(3))
+    write, database.write = database.write, lambda *_: 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        keeper.flush(0, 0)
+    assert (keeper.counts.acknowledged, keeper.waiting) == (0, 3)
+    database.write = write
+    keeper.flush(0, 0)
+    assert database.stamps_s == [0, 1, 2]
+
+
 def test_a_spool_of_another_version_is_refused_in_one_line(tmp_path):
     spool = Spool(tmp_path / "spool", 1000)
     spool.append(b"something else")

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from alembic.util import CommandError
 from mine_loc_interfaces import msg
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -139,7 +140,7 @@ class StoreNode(NodeBase):
             with self._engine.begin() as connection:
                 more = retain(connection, self._rule, self.now_ns())
             self._retention_problem = ""
-        except (SQLAlchemyError, OSError) as error:
+        except (SQLAlchemyError, CommandError, OSError) as error:
             more, self._retention_problem = False, reason(error)
         self._retain_from_ns = self.steady_ns() + (0 if more else _RETAIN_NS)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, Insert, Table, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
@@ -37,7 +38,7 @@ class DatabaseWriter:
                 self._write(batch, now_ns, _together)
             except _REFUSALS:
                 self._write(batch, now_ns, self._one_by_one)
-        except (SQLAlchemyError, OSError) as error:
+        except (SQLAlchemyError, CommandError, OSError) as error:
             raise DatabaseUnavailableError(reason(error)) from error
 
     def prepare(self) -> None:

@@ -98,10 +98,8 @@ class Keeper:
         with self._lock:
             while len(self._spool) and self._written(self._first(), now_ns, steady_ns):
                 self._spool.drop_first()
-            while batch := self._next():
-                if not self._acknowledge(batch, now_ns, steady_ns):
-                    self._held = batch
-                    return
+            while (batch := self._next()) and self._acknowledge(batch, now_ns, steady_ns):
+                self._held = None
 
     def close(self, now_ns: int, steady_ns: int) -> None:
         """Acknowledge what waits and let go of the spool."""
@@ -110,12 +108,11 @@ class Keeper:
             self._spool.close()
 
     def _next(self) -> Batch | None:
-        held, self._held = self._held, None
-        if held or not self._queue:
-            return held
-        taken = [self._queue.popleft() for _ in range(min(self._batch_rows, len(self._queue)))]
-        self._number += 1
-        return Batch.of(self._writer, self._number, self._arrange(taken))
+        if self._held is None and self._queue:
+            taken = [self._queue.popleft() for _ in range(min(self._batch_rows, len(self._queue)))]
+            self._number += 1
+            self._held = Batch.of(self._writer, self._number, self._arrange(taken))
+        return self._held
 
     def _acknowledge(self, batch: Batch, now_ns: int, steady_ns: int) -> bool:
         if len(self._spool) or not self._written(batch, now_ns, steady_ns):  # a writer's batches go in by their order
