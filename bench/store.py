@@ -108,7 +108,7 @@ def row_rates(url: str, folder: Path) -> dict[str, Any]:
 
 def fill(url: str, rows: int) -> None:
     """Rows a second apart for everybody, past the writer: the making is not what is measured."""
-    engine = open_engine(database_url(url), writing=True)
+    engine = open_engine(database_url(url), writing=True, patient=True)
     DatabaseWriter(engine).write(Batch.of("bench", 1, [_of_area(n) for n in range(max(PEOPLE, AREAS))]), START_NS)
     with engine.connect() as connection:
         people = [row.id for row in connection.execute(sqlalchemy.select(tables.people)) if row.name.startswith("q")]
