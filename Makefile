@@ -1,8 +1,8 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live bench-recorder lock \
-    clean
+.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live bench-recorder \
+    bench-store lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -53,6 +53,9 @@ bench-live: setup ## latency, fleets and load of the live graph on two cores (be
 
 bench-recorder: setup ## recorders killed under load, cost and rate, the player's punctuality (bench/results/recorder.json)
 	@$(run) python bench/recorder.py
+
+bench-store: setup ## cost of a row and times of questions on ten million rows (bench/results/store.json)
+	@$(run) python bench/store.py
 
 lock: setup      ## resolve requirements.in into requirements.txt
 	@tools/lock.sh

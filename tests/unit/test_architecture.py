@@ -23,7 +23,8 @@ ALLOWED = {
     "mine_loc_sim": {"mine_loc_core", "mine_loc_uwb", "mine_loc_pdr", "mine_loc_fusion", "mine_loc_coarse"},
 }
 ALLOWED["mine_loc_bringup"] = ALLOWED["mine_loc_sim"] | {"mine_loc_sim"}
-KEYLESS = {"rosbags", "mcap", "torch", "safetensors"}  # without a rosdep key: the graph runs without them, see below
+KEYLESS = {"rosbags", "mcap", "torch", "safetensors", "sqlalchemy", "alembic"}
+# without a rosdep key: the graph runs without them, see below
 ROSDEP = {  # import name → rosdep key
     "numpy": "python3-numpy",
     "scipy": "python3-scipy",

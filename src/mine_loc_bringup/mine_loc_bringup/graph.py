@@ -29,7 +29,15 @@ class NodeSpec:
 
     key: str
     package: str
-    per: Literal["site", "person_with_n100", "uwb_receiver", "relay", "monitor_with_port", "site_with_monitors"]
+    per: Literal[
+        "site",
+        "site_with_params",
+        "person_with_n100",
+        "uwb_receiver",
+        "relay",
+        "monitor_with_port",
+        "site_with_monitors",
+    ]
     parameter_class: str
     name: str
     namespace: str = "/"
@@ -105,6 +113,7 @@ def expand(
             parameter_file=files.get(spec.key),
         )
         for spec in graph
+        if spec.per != "site_with_params" or spec.key in files or spec.key in only
         for scope in _scopes(spec, site, people)
     ]
     allowed = dict.fromkeys([spec.key for spec in graph] + [process.name for process in processes])
@@ -149,7 +158,7 @@ def _given(spec: NodeSpec) -> frozenset[str]:
 
 
 def _scopes(spec: NodeSpec, site: Site, people: People) -> Iterator[dict[str, Any]]:
-    if spec.per == "site":
+    if spec.per in {"site", "site_with_params"}:
         yield {"site": site}
     elif spec.per == "uwb_receiver":
         yield from ({"site": site, "receiver": receiver} for receiver in site.uwb_receivers)

@@ -42,6 +42,15 @@ def test_the_example_mine_needs_a_driver_a_receiver_one_a_worn_n100_one_a_relay_
     ]
 
 
+def test_the_store_runs_where_the_site_has_a_file_for_it_or_it_is_asked_for(tmp_path):
+    assert [process.name for process in expand(SITE, PEOPLE, FOLDER, only=["store"])] == ["store"]
+    (tmp_path / "params").mkdir()
+    (tmp_path / "params" / "store.yaml").write_text("store:\n  ros__parameters:\n    keep_days: 400.0\n")
+    store = next(process for process in expand(SITE, PEOPLE, tmp_path) if process.name == "store")
+    assert store.module == "mine_loc_bringup.nodes.store"
+    assert store.parameter_file == tmp_path / "params" / "store.yaml"
+
+
 def test_a_relay_s_node_is_told_which_one_it_is():
     assert node("relay_shuttle_car").parameters == {"site": str(FOLDER), "relay": "shuttle_car"}
 
