@@ -7,6 +7,7 @@ coarse region is a place like them.
 """
 
 import math
+from copy import copy
 from typing import Any, Self
 
 import numpy as np
@@ -23,11 +24,13 @@ from mine_loc_fusion.estimate import (
     Estimate,
     PlaceFix,
     StepFix,
+    VelocityChange,
     is_position,
     is_step,
     symmetric,
 )
 from mine_loc_fusion.gallery_walls import between_walls, inside
+from mine_loc_fusion.inertial_prediction import InertialPrediction
 from mine_loc_fusion.step_kernel import OWN_STATES, SCALE, YAW
 from mine_loc_fusion.tightly_coupled_settings import TightlyCoupledSettings
 from mine_loc_fusion.yaw_alignment import YawAlignment
@@ -67,6 +70,7 @@ class TightlyCoupled:
         self._systematic_m2 = np.zeros((2, 2))
         self._starts = 0
         self._alignment = YawAlignment()
+        self._inertial = InertialPrediction(self._s.inertial)
         self._yaw_known = False
         self._stamp_ns = 0
         self._strike_ns: int | None = None
@@ -92,7 +96,7 @@ class TightlyCoupled:
     def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
         """See Estimator."""
         self._advance(inputs.stamp_ns)
-        verdicts: list[Verdict] = []
+        verdicts = [self._use_velocity_change(change, inputs.stamp_ns) for change in inputs.velocity_changes]
         for measurements in inputs.ranges:
             verdicts += self._use_ranges(measurements)
         for fix in inputs.positions:
@@ -138,6 +142,7 @@ class TightlyCoupled:
         state = vars(other)
         state.update(vars(self))
         state["_tracker"] = self._tracker.copy()
+        state["_inertial"] = copy(self._inertial)
         if not self._yaw_known:
             state["_alignment"] = self._alignment.copy()
         return other
@@ -159,6 +164,14 @@ class TightlyCoupled:
         if stepping != tracker.motion_known:
             tracker.motion_known = stepping
             tracker.believe(self._s.stepping if stepping else self._s.alone)
+
+    def _use_velocity_change(self, change: VelocityChange, stamp_ns: int) -> Verdict:
+        """Steps tell the motion better, and a waist swings with each."""
+        if self._tracker.motion_known:
+            return Verdict(Source.IMU, 0, Reason.DUPLICATE)
+        verdict = self._inertial.take(self._tracker, change, stamp_ns, yaw_known=self._yaw_known)
+        self._yaw_known = self._yaw_known or self._inertial.settle_yaw(self._tracker)
+        return verdict
 
     def _use_ranges(self, measurements: Measurements) -> list[Verdict]:
         solution = self._tracker.solve(measurements)
@@ -215,6 +228,7 @@ class TightlyCoupled:
             tracker.P[own + SCALE, own + SCALE] = self._s.scale_sd**2
         self._starts = tracker.starts
         self._alignment.forget_places()
+        self._inertial.forget()
         self._strike_ns = None
         self._stamp_ns = stamp_ns
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from mine_loc_fusion.inertial_prediction import InertialSettings
 from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 
@@ -32,6 +33,7 @@ class TightlyCoupledSettings:
     """Of ranges while steps tell the motion."""
     alone: RobustTrackerSettings = field(default_factory=lambda: RobustTrackerSettings(restart_after_s=math.inf))
     """Of ranges while they are all there is."""
+    inertial: InertialSettings = field(default_factory=InertialSettings)
     step_along_sd: float = 0.07
     """Of a step's length, relative to it, beyond what all steps of the person share."""
     step_across_sd_m: float = 0.04

@@ -86,6 +86,16 @@ class RobustTracker:
         """Whether there is a place."""
         return self.starts > 0
 
+    def add_states(self, count: int) -> None:
+        """Make room for more states of the caller, all 0, before those that are there."""
+        own, size = 2 * self.dimensions + 1, len(self.x)
+        old = np.r_[:own, own + count : size + count]
+        x, P = np.zeros(size + count), np.zeros((size + count, size + count))
+        x[old], P[np.ix_(old, old)] = self.x, self.P
+        self.x, self.P = x, P
+        self._own_states += count
+        self.first_link += count
+
     def advance(self, stamp_ns: int) -> None:
         """Predict the state to an instant; to an earlier one than that of the state nothing changes."""
         gone_s = (stamp_ns - self._stamp_ns) / NS_PER_S
