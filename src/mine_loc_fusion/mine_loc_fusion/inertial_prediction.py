@@ -19,8 +19,8 @@ _SAME_INSTANT_S = 0.02
 class InertialSettings:
     """Of the acceleration that dead reckoning tells, free of gravity, in odom; docs/fusion.md says where from."""
 
-    noise_density_m2_s3: float = 0.05**2
-    horizontal_error_sd_m_s2: float = 0.15
+    noise_density_m2_s3: float = 0.02**2
+    horizontal_error_sd_m_s2: float = 0.2
     """Mostly gravity on a horizon that is a degree off."""
     horizontal_error_time_s: float = 5.0
     """Dead reckoning finds the horizon anew within so long."""

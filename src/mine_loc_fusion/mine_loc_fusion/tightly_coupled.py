@@ -66,7 +66,8 @@ class TightlyCoupled:
         self._height_m = height_m
         self._area = area
         self._gate = chi2_quantile(self._s.gate_probability, 2)
-        self._tracker = RobustTracker(self._s.alone, OWN_STATES)
+        self._believed = self._s.alone
+        self._tracker = RobustTracker(self._believed, OWN_STATES)
         self._systematic_m2 = np.zeros((2, 2))
         self._starts = 0
         self._alignment = YawAlignment()
@@ -75,6 +76,7 @@ class TightlyCoupled:
         self._stamp_ns = 0
         self._strike_ns: int | None = None
         self._step_ns: int | None = None
+        self._change_ns: int | None = None
         self._uwb_ns: int | None = None
         self._ranges_ns: int | None = None
         self._region_ns: int | None = None
@@ -160,16 +162,20 @@ class TightlyCoupled:
         tracker.advance(stamp_ns)
         yaw_m2, scale_m2 = self._s.yaw_walk_sd_rad**2 * gone_s, self._s.scale_walk_sd**2 * gone_s
         step_kernel.drift(tracker.P, tracker.first_link, yaw_m2, scale_m2)
-        stepping = self._yaw_known and _since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
-        if stepping != tracker.motion_known:
-            tracker.motion_known = stepping
-            tracker.believe(self._s.stepping if stepping else self._s.alone)
+        tracker.motion_known = self._yaw_known and _since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
+        accelerating = _since_s(self._change_ns, stamp_ns) < self._s.motion_known_s
+        believed = self._s.stepping if tracker.motion_known else self._s.carried if accelerating else self._s.alone
+        if believed is not self._believed:
+            self._believed = believed
+            tracker.believe(believed)
 
     def _use_velocity_change(self, change: VelocityChange, stamp_ns: int) -> Verdict:
         """Steps tell the motion better, and a waist swings with each."""
         if self._tracker.motion_known:
             return Verdict(Source.IMU, 0, Reason.DUPLICATE)
         verdict = self._inertial.take(self._tracker, change, stamp_ns, yaw_known=self._yaw_known)
+        if verdict.accepted:
+            self._change_ns = stamp_ns
         self._yaw_known = self._yaw_known or self._inertial.settle_yaw(self._tracker)
         return verdict
 
