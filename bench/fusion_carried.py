@@ -2,8 +2,8 @@
 
     python bench/fusion_carried.py
 
-`mine_loc` has the ranges and what dead reckoning makes of the simulated N100; `mine_loc_ranges` the ranges alone, as all
-others. Errors are in space. InertialSettings was chosen on the tuning seeds (`--tune`), then the rest was run.
+`mine_loc` has the ranges and what dead reckoning makes of the simulated N100; `mine_loc_ranges` the ranges alone, as
+all others. Errors are in space. InertialSettings was chosen on the tuning seeds (`--tune`), then the rest was run.
 """
 
 import argparse

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mine_loc_core.gates import chi2_quantile
+from mine_loc_core.stamps import to_s
 from mine_loc_core.verdicts import Source, Verdict
 from mine_loc_uwb.measurements import Measurements
 
@@ -151,6 +152,11 @@ def is_velocity_change(change: VelocityChange) -> bool:
     """Whether this is a change that can happen to a person, over a time in which directions hold."""
     most_m_s = _LARGEST_ACCELERATION_M_S2 * change.interval_s
     return 0.0 < change.interval_s <= _LONGEST_CHANGE_S and bool(np.abs(change.change_m_s).max() <= most_m_s)
+
+
+def since_s(then_ns: int | None, now_ns: int) -> float:
+    """Time gone since an instant, inf since None."""
+    return inf if then_ns is None else to_s(max(0, now_ns - then_ns))
 
 
 def ce95_m(covariance_m2: Array) -> float:

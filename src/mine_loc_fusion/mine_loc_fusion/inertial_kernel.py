@@ -4,8 +4,8 @@ Own states of the filter, behind what its ranges have in common (`mine_loc_uwb.t
 
     cosine, sine of the yaw of odom while it is unknown; velocity at the change before (d); error of acceleration (d)
 
-A change measures the difference of two velocities (stochastic cloning, as a step measures that of two places). While the
-yaw is unknown it stands in the filter as cosine and sine, of variance 1/2 each before anything is known: horizontal
+A change measures the difference of two velocities (stochastic cloning, as a step measures that of two places). While
+the yaw is unknown it stands in the filter as cosine and sine, of variance 1/2 each before anything is known: horizontal
 changes are linear in them, so that no first guess is needed. The error of acceleration is that of the horizon (g times
 the tilt) and of the sensor, a Gauss–Markov process.
 """
@@ -66,7 +66,7 @@ def take_velocity_change(
     P: Array,
     dimensions: int,
     first_link: int,
-    yaw_known: bool,
+    yaw_known: int,
     change_m_s: Array,
     interval_s: float,
     variance_m2_s2: float,
@@ -74,19 +74,22 @@ def take_velocity_change(
 ) -> float:
     """Update (x, P) by a change of velocity (3,) in odom; returns the squared Mahalanobis distance (d degrees).
 
-    velocity − clone = R(yaw) change + error · interval + noise. Components are taken one after the other, which comes to
-    the same as all at once; beyond `gate` nothing changes.
+    velocity − clone = R(yaw) change + error · interval + noise; `yaw_known` = 1 says that R is of the yaw that steps
+    use, else it is of cosine and sine. Components are taken one after the other, each with R of the state by then;
+    beyond `gate` nothing changes.
     """
     d, own = dimensions, 2 * dimensions + 1
     yaw, clone, slope = first_link - OWN_STATES + YAW, own + VELOCITY, own + VELOCITY + d
     new_x, new_P, H, distance_sq = x.copy(), P.copy(), np.zeros(len(x)), 0.0
     for axis in range(d):
-        c, s = (math.cos(new_x[yaw]), math.sin(new_x[yaw])) if yaw_known else (new_x[own + COSINE], new_x[own + SINE])
+        c, s = (
+            (math.cos(new_x[yaw]), math.sin(new_x[yaw])) if yaw_known > 0 else (new_x[own + COSINE], new_x[own + SINE])
+        )
         along, across, H[:] = change_m_s[2], 0.0, 0.0
         if axis < 2:
             east, north = (change_m_s[0], change_m_s[1]) if axis == 0 else (change_m_s[1], -change_m_s[0])
             along, across = c * east - s * north, s * east + c * north
-            if yaw_known:
+            if yaw_known > 0:
                 H[yaw] = across
             else:
                 H[own + COSINE], H[own + SINE] = -east, north

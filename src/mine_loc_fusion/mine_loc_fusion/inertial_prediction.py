@@ -70,7 +70,7 @@ class InertialPrediction:
         d, gate = tracker.dimensions, chi2_quantile(self._s.gate_probability, tracker.dimensions)
         variance_m2_s2 = self._s.noise_density_m2_s3 * change.interval_s
         d2 = kernel.take_velocity_change(
-            tracker.x, tracker.P, d, tracker.first_link, yaw_known, change.change_m_s, change.interval_s,
+            tracker.x, tracker.P, d, tracker.first_link, int(yaw_known), change.change_m_s, change.interval_s,
             variance_m2_s2, gate,
         )  # fmt: skip
         return Verdict(Source.IMU, 0, Reason.ACCEPTED if d2 <= gate else Reason.GATE, d2, gate, d)

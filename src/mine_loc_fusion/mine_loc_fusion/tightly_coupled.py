@@ -27,6 +27,7 @@ from mine_loc_fusion.estimate import (
     VelocityChange,
     is_position,
     is_step,
+    since_s,
     symmetric,
 )
 from mine_loc_fusion.gallery_walls import between_walls, inside
@@ -127,7 +128,7 @@ class TightlyCoupled:
             doubted = _since_s(self._rock_ns, stamp_ns) < self._s.in_rock_counts_s
             position, velocity, covariance = between_walls(position, velocity, covariance, self._area, doubted=doubted)
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
-        uwb_s, step_s, region_s = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
+        uwb_s, step_s, region_s = (since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
         height_m = None if d == 2 else float(tracker.x[2])
         return Estimate(stamp_ns, position, velocity, covariance, yaw, uwb_s, step_s, region_s, height_m)
 
@@ -162,8 +163,8 @@ class TightlyCoupled:
         tracker.advance(stamp_ns)
         yaw_m2, scale_m2 = self._s.yaw_walk_sd_rad**2 * gone_s, self._s.scale_walk_sd**2 * gone_s
         step_kernel.drift(tracker.P, tracker.first_link, yaw_m2, scale_m2)
-        tracker.motion_known = self._yaw_known and _since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
-        accelerating = _since_s(self._change_ns, stamp_ns) < self._s.motion_known_s
+        tracker.motion_known = self._yaw_known and since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
+        accelerating = since_s(self._change_ns, stamp_ns) < self._s.motion_known_s
         believed = self._s.stepping if tracker.motion_known else self._s.carried if accelerating else self._s.alone
         if believed is not self._believed:
             self._believed = believed
@@ -290,10 +291,6 @@ def rehearse(dimensions: int) -> None:
         )
         place = PlaceFix(Source.LANDMARK, at_m, spread_m2)
         estimator.update(EpochInputs(stamp_ns, steps=(step,), ranges=(measurements,), places=(place,)))
-
-
-def _since_s(then_ns: int | None, now_ns: int) -> float:
-    return math.inf if then_ns is None else to_s(max(0, now_ns - then_ns))
 
 
 def _covariance_or_none(difference_m2: Array) -> Array:

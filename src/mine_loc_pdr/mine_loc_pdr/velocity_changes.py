@@ -41,9 +41,7 @@ class VelocityChanges:
         self._stepped_ns = stamp_ns
         self.interrupted()
 
-    def push(
-        self, stamp_ns: int, dt_s: float, orientation: Quaternion, force_m_s2: Vector3
-    ) -> VelocityChange | None:
+    def push(self, stamp_ns: int, dt_s: float, orientation: Quaternion, force_m_s2: Vector3) -> VelocityChange | None:
         """Take a sample `dt_s` after the last; the change up to it, once a tenth of a second is full."""
         if self._stepped_ns is not None and 0 <= stamp_ns - self._stepped_ns < STEPLESS_NS:
             return None
