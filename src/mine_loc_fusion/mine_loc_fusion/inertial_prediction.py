@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mine_loc_core.gates import chi2_quantile
-from mine_loc_core.stamps import to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_fusion import inertial_kernel as kernel
-from mine_loc_fusion.estimate import VelocityChange, is_velocity_change
+from mine_loc_fusion.estimate import VelocityChange
+from mine_loc_fusion.step_kernel import OWN_STATES
 from mine_loc_uwb.robust_tracker import RobustTracker
 
 _SAME_INSTANT_S = 0.02
@@ -32,34 +32,24 @@ class InertialSettings:
 
 
 class InertialPrediction:
-    """The states of one person's tracker that velocity changes need; they come with the first change."""
+    """Takes velocity changes into a tracker, which gets the states that they need with the first one."""
 
     def __init__(self, settings: InertialSettings | None = None) -> None:
         self._s = s = settings or InertialSettings()
         self._error_sd_m_s2 = np.array([s.horizontal_error_sd_m_s2] * 2 + [s.vertical_error_sd_m_s2])
         self._error_time_s = np.array([s.horizontal_error_time_s] * 2 + [s.vertical_error_time_s])
-        self._begun = False
-        self._before_ns: int | None = None
 
-    def forget(self) -> None:
-        """The track begins anew: the velocity before is not this one's."""
-        self._before_ns = None
+    def take(self, tracker: RobustTracker, change: VelocityChange, gone_s: float | None, *, yaw_known: bool) -> Verdict:
+        """Use the change of a started tracker's velocity that ends now, `gone_s` after the last one, None = the first.
 
-    def take(self, tracker: RobustTracker, change: VelocityChange, stamp_ns: int, *, yaw_known: bool) -> Verdict:
-        """Use a change of the velocity of a tracker that stands at `stamp_ns`; the first of a row is but remembered."""
-        if not is_velocity_change(change):
-            return Verdict(Source.IMU, 0, Reason.INVALID)
-        if not tracker.started:
-            return Verdict(Source.IMU, 0, Reason.NOT_INITIALISED)
+        One that does not follow on the last is not measured: the velocity at its beginning was not kept.
+        """
         d = tracker.dimensions
-        if not self._begun:
+        if not _has_states(tracker):
             tracker.add_states(kernel.inertial_states(d))
             kernel.begin(tracker.P, d, self._error_sd_m_s2)
-            self._begun = True
-        before_ns, self._before_ns = self._before_ns, stamp_ns
         verdict = Verdict(Source.IMU, 0, Reason.NOT_INITIALISED)
-        if before_ns is not None:
-            gone_s = to_s(stamp_ns - before_ns)
+        if gone_s is not None:
             kernel.pass_time(tracker.x, tracker.P, d, gone_s, self._error_sd_m_s2, self._error_time_s)
             if abs(gone_s - change.interval_s) < _SAME_INSTANT_S:
                 verdict = self._measure(tracker, change, yaw_known=yaw_known)
@@ -69,15 +59,13 @@ class InertialPrediction:
     def _measure(self, tracker: RobustTracker, change: VelocityChange, *, yaw_known: bool) -> Verdict:
         d, gate = tracker.dimensions, chi2_quantile(self._s.gate_probability, tracker.dimensions)
         variance_m2_s2 = self._s.noise_density_m2_s3 * change.interval_s
-        d2 = kernel.take_velocity_change(
-            tracker.x, tracker.P, d, tracker.first_link, int(yaw_known), change.change_m_s, change.interval_s,
-            variance_m2_s2, gate,
-        )  # fmt: skip
+        how = int(yaw_known), change.change_m_s, change.interval_s, variance_m2_s2, gate
+        d2 = kernel.take_velocity_change(tracker.x, tracker.P, d, tracker.first_link, *how)
         return Verdict(Source.IMU, 0, Reason.ACCEPTED if d2 <= gate else Reason.GATE, d2, gate, d)
 
     def settle_yaw(self, tracker: RobustTracker) -> bool:
         """Hand the yaw of odom on as the angle that steps use, once the changes tell it well enough."""
-        if not self._begun:
+        if not _has_states(tracker):
             return False
         first = 2 * tracker.dimensions + 1
         states = slice(first + kernel.COSINE, first + kernel.SINE + 1)
@@ -86,3 +74,7 @@ class InertialPrediction:
         if known:
             kernel.settle_yaw(tracker.x, tracker.P, tracker.dimensions, tracker.first_link)
         return known
+
+
+def _has_states(tracker: RobustTracker) -> bool:
+    return tracker.first_link > 2 * tracker.dimensions + 1 + OWN_STATES

@@ -7,7 +7,6 @@ coarse region is a place like them.
 """
 
 import math
-from copy import copy
 from typing import Any, Self
 
 import numpy as np
@@ -27,6 +26,7 @@ from mine_loc_fusion.estimate import (
     VelocityChange,
     is_position,
     is_step,
+    is_velocity_change,
     since_s,
     symmetric,
 )
@@ -77,6 +77,7 @@ class TightlyCoupled:
         self._stamp_ns = 0
         self._strike_ns: int | None = None
         self._step_ns: int | None = None
+        self._velocity_ns: int | None = None
         self._change_ns: int | None = None
         self._uwb_ns: int | None = None
         self._ranges_ns: int | None = None
@@ -145,7 +146,6 @@ class TightlyCoupled:
         state = vars(other)
         state.update(vars(self))
         state["_tracker"] = self._tracker.copy()
-        state["_inertial"] = copy(self._inertial)
         if not self._yaw_known:
             state["_alignment"] = self._alignment.copy()
         return other
@@ -171,10 +171,16 @@ class TightlyCoupled:
             tracker.believe(believed)
 
     def _use_velocity_change(self, change: VelocityChange, stamp_ns: int) -> Verdict:
-        """Steps tell the motion better, and a waist swings with each."""
+        """Where steps tell the motion a waist swings with each: they are better."""
+        if not is_velocity_change(change):
+            return Verdict(Source.IMU, 0, Reason.INVALID)
+        if not self._tracker.started:
+            return Verdict(Source.IMU, 0, Reason.NOT_INITIALISED)
         if self._tracker.motion_known:
             return Verdict(Source.IMU, 0, Reason.DUPLICATE)
-        verdict = self._inertial.take(self._tracker, change, stamp_ns, yaw_known=self._yaw_known)
+        gone_s = None if self._velocity_ns is None else to_s(stamp_ns - self._velocity_ns)
+        self._velocity_ns = stamp_ns
+        verdict = self._inertial.take(self._tracker, change, gone_s, yaw_known=self._yaw_known)
         if verdict.accepted:
             self._change_ns = stamp_ns
         self._yaw_known = self._yaw_known or self._inertial.settle_yaw(self._tracker)
@@ -235,7 +241,7 @@ class TightlyCoupled:
             tracker.P[own + SCALE, own + SCALE] = self._s.scale_sd**2
         self._starts = tracker.starts
         self._alignment.forget_places()
-        self._inertial.forget()
+        self._velocity_ns = None
         self._strike_ns = None
         self._stamp_ns = stamp_ns
 
