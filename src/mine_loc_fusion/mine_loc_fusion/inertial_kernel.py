@@ -28,10 +28,20 @@ def inertial_states(dimensions: int) -> int:
 
 
 @njit(cache=True)
-def begin(P: Array, dimensions: int, error_sd_m_s2: Array) -> None:
-    """Nothing is known of the yaw, and of the error of acceleration (3,) only how large it is."""
+def forget_yaw(x: Array, P: Array, dimensions: int) -> None:
+    """Nothing is known of the yaw: its cosine and sine have mean 0 and variance 1/2."""
+    for state in (2 * dimensions + 1 + COSINE, 2 * dimensions + 1 + SINE):
+        x[state] = 0.0
+        P[state, :] = 0.0
+        P[:, state] = 0.0
+        P[state, state] = 0.5
+
+
+@njit(cache=True)
+def begin(x: Array, P: Array, dimensions: int, error_sd_m_s2: Array) -> None:
+    """Of the error of acceleration (3,) it is known how large it is, of the yaw nothing."""
+    forget_yaw(x, P, dimensions)
     own = 2 * dimensions + 1
-    P[own + COSINE, own + COSINE] = P[own + SINE, own + SINE] = 0.5
     for axis in range(dimensions):
         error = own + VELOCITY + dimensions + axis
         P[error, error] = error_sd_m_s2[axis] ** 2

@@ -13,6 +13,7 @@ from mine_loc_fusion.step_kernel import OWN_STATES
 from mine_loc_uwb.robust_tracker import RobustTracker
 
 _SAME_INSTANT_S = 0.02
+_CONTRADICTED_SDS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ class InertialPrediction:
         d = tracker.dimensions
         if not _has_states(tracker):
             tracker.add_states(kernel.inertial_states(d))
-            kernel.begin(tracker.P, d, self._error_sd_m_s2)
+            kernel.begin(tracker.x, tracker.P, d, self._error_sd_m_s2)
         verdict = Verdict(Source.IMU, 0, Reason.NOT_INITIALISED)
         if gone_s is not None:
             kernel.pass_time(tracker.x, tracker.P, d, gone_s, self._error_sd_m_s2, self._error_time_s)
@@ -64,13 +65,21 @@ class InertialPrediction:
         return Verdict(Source.IMU, 0, Reason.ACCEPTED if d2 <= gate else Reason.GATE, d2, gate, d)
 
     def settle_yaw(self, tracker: RobustTracker) -> bool:
-        """Hand the yaw of odom on as the angle that steps use, once the changes tell it well enough."""
+        """Hand the yaw of odom on as the angle that steps use, once the changes tell it well enough.
+
+        A cosine and a sine whose squares do not add up to 1 are of no angle (ranges that drag the track, a map whose z
+        axis points down): then they are sought anew.
+        """
         if not _has_states(tracker):
             return False
         first = 2 * tracker.dimensions + 1
         states = slice(first + kernel.COSINE, first + kernel.SINE + 1)
-        spread, length = np.linalg.eigvalsh(tracker.P[states, states])[-1], np.linalg.norm(tracker.x[states])
-        known = bool(spread <= (self._s.yaw_known_sd_rad * length) ** 2)
+        sd = math.sqrt(np.linalg.eigvalsh(tracker.P[states, states])[-1])
+        length = float(np.linalg.norm(tracker.x[states]))
+        if length + _CONTRADICTED_SDS * sd < 1.0:
+            kernel.forget_yaw(tracker.x, tracker.P, tracker.dimensions)
+            return False
+        known = sd <= self._s.yaw_known_sd_rad * length
         if known:
             kernel.settle_yaw(tracker.x, tracker.P, tracker.dimensions, tracker.first_link)
         return known

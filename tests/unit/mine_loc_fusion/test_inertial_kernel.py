@@ -97,6 +97,21 @@ def test_a_velocity_that_is_remembered_is_the_velocity_with_all_its_covariances(
 
 @given(SEEDS, DIMENSIONS)
 @settings(max_examples=20, deadline=None)
+def test_a_yaw_that_is_forgotten_is_as_likely_any(seed, dimensions):
+    x, P, _ = state(seed, dimensions)
+    rest = P.copy()
+    kernel.forget_yaw(x, P, dimensions)
+    first = 2 * dimensions + 1
+    pair = [first + COSINE, first + SINE]
+    assert x[pair].tolist() == [0.0, 0.0]
+    assert P[np.ix_(pair, pair)].tolist() == [[0.5, 0.0], [0.0, 0.5]]
+    others = np.delete(np.arange(len(x)), pair)
+    assert (P[np.ix_(others, others)] == rest[np.ix_(others, others)]).all()
+    assert not P[np.ix_(pair, others)].any()
+
+
+@given(SEEDS, DIMENSIONS)
+@settings(max_examples=20, deadline=None)
 def test_the_error_of_acceleration_comes_to_rest_at_how_large_it_is(seed, dimensions):
     x, P, _ = state(seed, dimensions)
     kernel.pass_time(x, P, dimensions, 1e6, SDS, TIMES)

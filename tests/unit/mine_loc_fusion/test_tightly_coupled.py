@@ -239,6 +239,21 @@ def test_changes_of_velocity_make_a_ride_with_ranges_better(space):
     assert errors[0] < 0.8 * errors[1]
 
 
+def test_of_changes_that_are_no_rotation_of_the_motion_no_yaw_is_made_and_they_do_little_harm():
+    errors = []
+    for mirrored in (True, False):
+        subject, ride = TightlyCoupled(), Ride()
+        off_m = []
+        for _ in range(400):
+            inputs = ride.next(changes=mirrored)
+            told = tuple(replace(c, change_m_s=c.change_m_s * [1.0, -1.0, 1.0]) for c in inputs.velocity_changes)
+            subject.update(replace(inputs, velocity_changes=told))
+            off_m.append(np.linalg.norm(subject.estimate(ride.stamp_ns).position_m - ride.place_m(ride.number)[:2]))
+        assert subject.estimate(ride.stamp_ns).yaw_offset_rad is None
+        errors.append(np.mean(off_m))
+    assert errors[0] < 1.5 * errors[1]
+
+
 def test_through_five_seconds_without_ranges_changes_of_velocity_carry_the_person():
     off_m = []
     for changes in (True, False):
