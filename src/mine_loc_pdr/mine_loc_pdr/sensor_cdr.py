@@ -20,8 +20,8 @@ _VECTOR = {order: struct.Struct(order + "3d") for order in "<>"}
 _IMU = struct.Struct("<37d")
 """Orientation x y z w, angular velocity and linear acceleration, each with its covariance behind it."""
 _STAMP = struct.Struct("<iI")
-_IDENTITY = 0.0, 0.0, 0.0, 1.0
-_ABSENT = -1.0, *8 * (0.0,)  # sensor_msgs/Imu: this quantity is not there
+_IDENTITY = 1.0, 0.0, 0.0, 0.0
+_ABSENT: tuple[float, ...] = (-1.0, *8 * (0.0,))  # sensor_msgs/Imu: this quantity is not there
 _RATE_AT = 8 * (4 + 9)  # behind the orientation and its covariance
 _FORCE_AT = _RATE_AT + 8 * (3 + 9)
 
@@ -42,14 +42,11 @@ class ImuWriter:
 
     def write(self, stamp_ns: int, orientation: Quaternion | None, rate_rad_s: Vector3, force_m_s2: Vector3) -> bytes:
         """One sample; `orientation` is w x y z, None = not there."""
-        if orientation is None:
-            turned, spread = _IDENTITY, _ABSENT
-        else:
-            w, x, y, z = orientation
-            turned, spread = (x, y, z, w), self._orientation
+        w, x, y, z = orientation or _IDENTITY
+        spread = _ABSENT if orientation is None else self._orientation
         _STAMP.pack_into(self._bytes, _BODY_AT, *divmod(stamp_ns, NS_PER_S))
         _IMU.pack_into(
-            self._bytes, self._doubles_at, *turned, *spread, *rate_rad_s, *self._rate, *force_m_s2, *self._force
+            self._bytes, self._doubles_at, x, y, z, w, *spread, *rate_rad_s, *self._rate, *force_m_s2, *self._force
         )
         return bytes(self._bytes)
 
