@@ -15,7 +15,7 @@ from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import to_ns, to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_core.walkable_area import WalkableArea
-from mine_loc_fusion import step_kernel
+from mine_loc_fusion import inertial_kernel, step_kernel
 from mine_loc_fusion.estimate import (
     SOURCE_OF,
     Array,
@@ -290,6 +290,11 @@ def rehearse(dimensions: int) -> None:
     anchors_m = np.array([[9.0, 0.0, 2.0], [0.0, 9.0, 3.0]])
     none, plane_m = np.full(2, math.nan), 1.0 if dimensions == 2 else None
     ids, range_m = np.array([1, 2], np.uint64), np.linalg.norm(anchors_m, axis=1)
+    change = VelocityChange(np.zeros(3), 0.1)
+    for stamp_ns in (to_ns(0.1), to_ns(0.2)):  # before the steps, beside which they are not used
+        estimator.update(EpochInputs(stamp_ns, velocity_changes=(change,)))
+    tracker = estimator._tracker  # noqa: SLF001 its own
+    inertial_kernel.settle_yaw(np.ones_like(tracker.x), tracker.P.copy(), dimensions, tracker.first_link)
     step = StepFix(0.7, 0.01, 0.0, 0.01, 0.5)
     for stamp_ns in (to_ns(0.5), to_ns(1.0)):
         measurements = Measurements(

@@ -10,10 +10,11 @@ from walks import HALL, HEIGHT_M, at, ranges_to, step_fix
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_core.verdicts import Reason, Source
+from mine_loc_fusion import inertial_kernel
 from mine_loc_fusion.estimate import EpochInputs, VelocityChange
 from mine_loc_fusion.late_inputs import LateInputCorrector
 from mine_loc_fusion.step_kernel import YAW
-from mine_loc_fusion.tightly_coupled import TightlyCoupled
+from mine_loc_fusion.tightly_coupled import TightlyCoupled, rehearse
 
 
 @dataclass
@@ -200,3 +201,14 @@ def test_changes_that_come_late_end_where_those_on_time_do():
         ends.append(subject.estimate(ride.stamp_ns))
     assert ends[0].position_m == pytest.approx(ends[1].position_m, abs=1e-9)
     assert ends[0].covariance == pytest.approx(ends[1].covariance, abs=1e-9)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_after_a_rehearsal_nothing_is_left_to_compile(dimensions):
+    kernels = [each for each in vars(inertial_kernel).values() if hasattr(each, "nopython_signatures")]
+    rehearse(dimensions)
+    before = [len(each.nopython_signatures) for each in kernels]
+    assert len(before) == 6
+    assert 0 not in before
+    carried(40.0, space=dimensions == 3)
+    assert [len(each.nopython_signatures) for each in kernels] == before
