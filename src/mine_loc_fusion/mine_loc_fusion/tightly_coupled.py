@@ -126,7 +126,7 @@ class TightlyCoupled:
             covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
         covariance[:2, :2] += self._systematic_m2
         if self._area is not None:
-            doubted = _since_s(self._rock_ns, stamp_ns) < self._s.in_rock_counts_s
+            doubted = since_s(self._rock_ns, stamp_ns) < self._s.in_rock_counts_s
             position, velocity, covariance = between_walls(position, velocity, covariance, self._area, doubted=doubted)
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
         uwb_s, step_s, region_s = (since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
