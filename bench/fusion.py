@@ -19,6 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 import fusion_blackout
+import fusion_carried
 import fusion_isas
 import fusion_paper_a
 import fusion_proximity
@@ -27,6 +28,7 @@ RESULTS = Path(__file__).parent / "results" / "fusion.json"
 PARTS: Mapping[str, Callable[[], Any]] = {
     "paper_a": fusion_paper_a.run,
     "isas_walk1": fusion_isas.run,
+    "carried": fusion_carried.run,
     "blackout": fusion_blackout.run,
     "proximity": fusion_proximity.proximity_rows,
     "proximity_obstacles": partial(fusion_proximity.proximity_rows, "loading_place", "obstacles"),

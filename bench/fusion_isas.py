@@ -4,6 +4,9 @@
 
 RMSE in space after one time offset and one rigid alignment. Anchors and ranges are those of the recording, without
 calibration; every method has its defaults, GTSAM (a chain of points, iSAM2 over 5 s, Cauchy) those of fusion_gtsam.py.
+`mine_loc` has what dead reckoning makes of the recording's IMU (82 Hz) as well; the other rows are of ranges alone.
+
+The recording's coordinates of anchors have z downwards, as its accelerometer says; ours upwards (REP 103).
 """
 
 import json
@@ -11,6 +14,8 @@ from collections.abc import Iterator
 
 import gtsam
 import numpy as np
+from fusion_carried import dead_reckoned
+from fusion_carried import fused as carried_track
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.spatial.transform import Rotation
 from uwb_tracks import Array, measurements_of
@@ -18,8 +23,8 @@ from uwb_tracks import Array, measurements_of
 from mine_loc_bringup.recordings.isas import Walk, read_walk
 from mine_loc_bringup.recordings.public_data import data_file
 from mine_loc_core.stamps import NS_PER_S
-from mine_loc_fusion.estimate import EpochInputs
-from mine_loc_fusion.tightly_coupled import TightlyCoupled
+from mine_loc_pdr.dead_reckoning import ImuSample, PedestrianDeadReckoning
+from mine_loc_pdr.stride import PendulumStrideModel
 from mine_loc_uwb.fix import FixStatus
 from mine_loc_uwb.measurements import Measurements
 from mine_loc_uwb.parameters import UwbSolverParameters
@@ -27,24 +32,23 @@ from mine_loc_uwb.ranging import RangingRound
 from mine_loc_uwb.solvers import RANGE_SOLVERS
 
 GIVEN_SD_M = 0.1
-_HEIGHT_M = 1.2
+_HEIGHT_M = -1.2
 _SEARCH_S = 1.0
 _GRID_S = 0.05
-_START_M = np.array([2.0, -1.0, _HEIGHT_M])
+_START_M = np.array([2.0, 1.0, _HEIGHT_M])
 """In the middle of the room: where iterations begin."""
+_UP = np.array([1.0, -1.0, -1.0])
 
 
-def read() -> tuple[list[Measurements], Array, Array]:
-    """Rounds with valid ranges, instants of truth (m,) and places (m, 3)."""
-    walk = read_walk(data_file("isas_walk_uwb_imu", "dataset", "ISAS-Walk1.bag"))
+def rounds_of(walk: Walk) -> list[Measurements]:
+    """Rounds with valid ranges."""
     rounds = [_round(at.stamp_ns / NS_PER_S, ranging, walk) for at, ranging in walk.rounds]
-    truth_s = np.array([stamp_ns for stamp_ns, _, _ in walk.truth]) / NS_PER_S
-    return [each for each in rounds if len(each)], truth_s, np.array([place_m for _, place_m, _ in walk.truth])
+    return [each for each in rounds if len(each)]
 
 
 def _round(time_s: float, ranging: RangingRound, walk: Walk) -> Measurements:
     ranges_m = {item.anchor_id: item.range_m for item in ranging.ranges if np.isfinite(item.range_m)}
-    anchors_m = np.array([walk.anchors_m[anchor] for anchor in ranges_m]).reshape(-1, 3)
+    anchors_m = _UP * np.array([walk.anchors_m[anchor] for anchor in ranges_m]).reshape(-1, 3)
     range_m = np.array(list(ranges_m.values()), float)
     return measurements_of(time_s, anchors_m, range_m, sd_m=GIVEN_SD_M, height_m=None, ids=list(ranges_m))
 
@@ -67,14 +71,12 @@ def solver(name: str, rounds: list[Measurements]) -> Iterator[tuple[float, Array
             yield each.stamp_ns / NS_PER_S, fix.position_m
 
 
-def fused(rounds: list[Measurements]) -> Iterator[tuple[float, Array]]:
-    """The default estimator of the fusion."""
-    estimator = TightlyCoupled(height_m=_HEIGHT_M)
-    for each in rounds:
-        estimator.update(EpochInputs(each.stamp_ns, ranges=(each,)))
-        estimate = estimator.estimate(each.stamp_ns)
-        if estimate is not None:
-            yield each.stamp_ns / NS_PER_S, np.append(estimate.position_m, estimate.height_m)
+def fused(rounds: list[Measurements], samples: list[ImuSample]) -> Iterator[tuple[float, Array]]:
+    """The default estimator of the fusion, with what dead reckoning makes of the samples."""
+    pdr = PedestrianDeadReckoning(PendulumStrideModel(1.75))
+    inertial = [epoch for sample in samples for epoch in dead_reckoned(pdr, sample)]
+    for stamp_ns, place_m, _ in carried_track(rounds, inertial, height_m=_HEIGHT_M):
+        yield stamp_ns / NS_PER_S, place_m
 
 
 def smoothed(rounds: list[Measurements]) -> Iterator[tuple[float, Array]]:
@@ -123,10 +125,14 @@ def rmse_m(track: list[tuple[float, Array]], truth_s: Array, truth_m: Array) -> 
 
 def run() -> dict[str, float]:
     """RMSE in space [m] of each."""
-    rounds, truth_s, truth_m = read()
-    tracks = {"least_squares": list(plain_least_squares(rounds)), "mine_loc": list(fused(rounds))}
+    walk = read_walk(data_file("isas_walk_uwb_imu", "dataset", "ISAS-Walk1.bag"))
+    rounds, samples = rounds_of(walk), [ImuSample(m.stamp_ns, m.rate_rad_s, m.force_m_s2) for _, m in walk.imu]
+    tracks = {"least_squares": list(plain_least_squares(rounds)), "mine_loc": list(fused(rounds, samples))}
+    tracks["mine_loc_ranges"] = list(fused(rounds, []))
     tracks |= {name: list(solver(name, rounds)) for name in RANGE_SOLVERS if name != "least_squares"}
     tracks["gtsam"] = list(smoothed(rounds))
+    truth_s = np.array([stamp_ns for stamp_ns, _, _ in walk.truth]) / NS_PER_S
+    truth_m = np.array([place_m for _, place_m, _ in walk.truth])
     return {name: rmse_m(track, truth_s, truth_m) for name, track in tracks.items()}
 
 

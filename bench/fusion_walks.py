@@ -47,7 +47,7 @@ _CHUNK = 16  # rounds the channel is asked for at a time
 _WHITE_SD_M = 0.03
 _FIRST_LEG_M = 20.0
 _CALIBRATED_SD = 0.03  # one walk of a person differs from the next by so much (docs/pdr.md)
-_START_NS = 10 * NS_PER_S  # stamps begin well above zero
+START_NS = 10 * NS_PER_S  # stamps begin well above zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +94,15 @@ def make_walk(of: Mapping[str, Any], seed: int) -> Walk:
     corners[0] = replace(corners[0], pause_s=of["stand_s"])
     corners[-1] = replace(corners[-1], pause_s=of["stand_s"])
     walker = _walker(person, corners, walking)
-    stop_ns = _START_NS + to_ns(walker.duration_s)
+    stop_ns = START_NS + to_ns(walker.duration_s)
     steps = _steps(person, N100Device(errors, walker, GalleryField(field), device), stop_ns)
     steps = _scaled(of, steps, math.exp(of["stride_error"] * known.standard_normal()))
-    stamp_ns = np.arange(_START_NS, stop_ns, to_ns(of["period_s"]))
+    stamp_ns = np.arange(START_NS, stop_ns, to_ns(of["period_s"]))
     motion = walker.motion(stamp_ns)
     tag_m = motion.position_m.copy()
     tag_m[:, 2] = of["tag_height_m"]
-    rounds = _rounds(of, stamp_ns, tag_m, motion.heading_rad, radio, detours)
+    blocked_m = _detours_m(of, tag_m, len(of["anchors_m"]), detours)
+    rounds = rounds_of(of, stamp_ns, tag_m, motion.heading_rad, blocked_m, radio)
     return Walk(rounds, steps, tag_m[:, :2], tag_m[0, :2], _known_yaw_rad(of, walker, steps), _area(of))
 
 
@@ -123,7 +124,7 @@ def _known_yaw_rad(of: Mapping[str, Any], walker: Walker, steps: Sequence[Report
 
 
 def _walker(person: Person, way_points: Sequence[WayPoint], rng: np.random.Generator) -> Walker:
-    return Walker(person, plan_route(way_points, person.preferred_speed_m_s), rng, start_ns=_START_NS)
+    return Walker(person, plan_route(way_points, person.preferred_speed_m_s), rng, start_ns=START_NS)
 
 
 def _lap_m(of: Mapping[str, Any]) -> float:
@@ -162,17 +163,17 @@ def _steps(person: Person, n100: N100Device, stop_ns: int) -> list[ReportedStep]
     return steps
 
 
-def _rounds(
+def rounds_of(
     of: Mapping[str, Any],
     stamp_ns: np.ndarray,
     tag_m: Array,
     facing_rad: Array,
+    blocked_m: Array,
     radio: np.random.Generator,
-    detours: np.random.Generator,
 ) -> list[Measurements]:
+    """Ranging rounds of a tag at places (n, 3), over excess ways (n, anchors), 0 = in sight."""
     anchors_m = np.array(of["anchors_m"], float)
     count = len(anchors_m)
-    blocked_m = _detours_m(of, tag_m, count, detours)
     kind = TagLinks if of["judged_by"] == "classifier" else FastTagLinks
     links = kind(INDUSTRIAL, Radios.draw(1, radio), Radios.draw(count, radio), _wearer(of, radio), radio)
     found = []

@@ -1,5 +1,6 @@
 """A fusion node by itself: told where people are, told what to leave out, given regions, serving some of the people."""
 
+import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from mine_loc_interfaces.srv import SetPose, ToggleSensor
 
 from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.stamps import NS_PER_S
 
 pytestmark = pytest.mark.graph
 
@@ -74,8 +76,9 @@ class Fusion:
         request = ToggleSensor.Request(person="walker", source=source, enabled=enabled)
         return self.observer.call(ToggleSensor, "/fusion/toggle_sensor", request)
 
-    def set_pose(self, name: str, frame: str = "map", variance_m2: float = 0.25) -> object:
+    def set_pose(self, name: str, frame: str = "map", variance_m2: float = 0.25, stamp_ns: int = 0) -> object:
         pose = PoseWithCovarianceStamped()
+        pose.header.stamp = to_time(stamp_ns)
         pose.header.frame_id = frame
         pose.pose.pose.position.x, pose.pose.pose.position.y = AT_M
         pose.pose.covariance[0] = pose.pose.covariance[7] = variance_m2
@@ -108,7 +111,10 @@ def test_who_is_told_to_be_somewhere_is_there_and_coasts(fusion):
     assert "nobody called 'ghost'" in fusion.set_pose("ghost").reason
     assert "'odom'" in fusion.set_pose("walker", frame="odom").reason
     assert "covariance" in fusion.set_pose("walker", variance_m2=0.0).reason
-    assert fusion.set_pose("walker").success
+    ahead = fusion.set_pose("walker", stamp_ns=time.time_ns() + 60 * NS_PER_S)
+    assert (ahead.success, "allowed: 50 ms (future_ms)" in ahead.reason) == (False, True)
+    assert fusion.last() is None
+    assert fusion.set_pose("walker", stamp_ns=time.time_ns()).success
     fusion.observer.wait_for(lambda: fusion.last() is not None, what="a pose")
     pose = fusion.last()
     assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == pytest.approx(AT_M, abs=0.01)
@@ -119,7 +125,7 @@ def test_who_is_told_to_be_somewhere_is_there_and_coasts(fusion):
 def test_ranges_left_out_are_disabled_and_the_person_coasts_until_they_count_again(fusion):
     fusion.ranging_until(lambda: fusion.mode() == msg.PersonPose.UWB_ONLY, "a position by ranges")
     assert fusion.reasons() == [msg.MeasurementVerdict.ACCEPTED] * len(ANCHORS)
-    refusal = fusion.toggle(msg.MeasurementVerdict.IMU, enabled=False)
+    refusal = fusion.toggle(msg.MeasurementVerdict.HEADING, enabled=False)
     assert (refusal.success, "allowed" in refusal.reason) == (False, True)
     assert fusion.toggle(msg.MeasurementVerdict.RANGE, enabled=False).success
     fusion.ranging_until(lambda: fusion.mode() == msg.PersonPose.COASTING, "coasting")
@@ -128,6 +134,26 @@ def test_ranges_left_out_are_disabled_and_the_person_coasts_until_they_count_aga
     assert fusion.toggle(msg.MeasurementVerdict.RANGE, enabled=True).success
     fusion.ranging_until(lambda: fusion.mode() == msg.PersonPose.UWB_ONLY, "ranges again")
     assert msg.MeasurementVerdict.ACCEPTED in fusion.reasons()
+
+
+def test_between_ranges_changes_of_velocity_carry_a_person_who_does_not_step(fusion):
+    fusion.ranging_until(lambda: fusion.mode() == msg.PersonPose.UWB_ONLY, "a position by ranges")
+
+    def change() -> bool:
+        """Send the change of the tenth of a second since the last."""
+        fusion.range()
+        change = msg.VelocityChange(person="walker", interval=0.1)
+        epoch = msg.Epoch(person="walker", velocity_changes=[change])
+        change.header.stamp = epoch.header.stamp = to_time(next(stamps))
+        fusion.epochs.publish(epoch)
+        return any(
+            (verdict.source, verdict.reason) == (msg.MeasurementVerdict.IMU, msg.MeasurementVerdict.ACCEPTED)
+            for array in fusion.verdicts.messages
+            for verdict in array.verdicts
+        )
+
+    stamps = itertools.count(time.time_ns(), 10**8)
+    fusion.observer.wait_for(change, what="a change that is used")
 
 
 def test_a_region_starts_a_person_and_ranges_take_over(fusion):

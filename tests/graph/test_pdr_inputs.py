@@ -9,7 +9,7 @@ import pytest
 from graph.observer import Observer
 from graph.processes import node_command, running
 from graph.walker import ROLL_RAD_S, SWAY_M_S2, write_site
-from mine_loc_interfaces.msg import StrideUpdate, UwbPose
+from mine_loc_interfaces.msg import Step, StrideUpdate, UwbPose, VelocityChange
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
 from tf2_msgs.msg import TFMessage
@@ -110,6 +110,20 @@ def test_of_field_and_positions_the_node_learns_and_tells(sensors, observer):
     observer.wait_for(lambda: said(observer, "field_used"), what="the field in use")
     assert said(observer, "magnetometer") == "heard"
     assert float(said(observer, "stride_k").split()[0]) == pytest.approx(update.k, abs=0.001)
+
+
+def test_while_there_are_no_steps_changes_of_velocity_are_told(sensors, observer):
+    steps, changes = observer.listen(Step, "/pdr/steps"), observer.listen(VelocityChange, "/pdr/velocity_changes")
+    sensors.walk(6.0)
+    observer.wait_for(lambda: len(steps) >= 5, what="steps")
+    standing = [each for each in changes.messages if to_stamp_ns(each.header.stamp) <= stamp_ns(100)]
+    assert [each.count for each in standing] == [1, 2, 3, 4]  # the horizon takes half of the second of standing
+    for each in standing:
+        assert (each.person, each.header.frame_id) == ("walker", "walker/odom")
+        assert each.interval == pytest.approx(0.1, abs=1e-6)
+        assert (each.change.x, each.change.y, each.change.z) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+    second_ns = to_stamp_ns(steps.messages[1].header.stamp)
+    assert max(to_stamp_ns(each.header.stamp) for each in changes.messages) < second_ns + 5 * 10**8
 
 
 def test_without_magnetometer_the_node_says_so_and_walks_on(sensors, observer):

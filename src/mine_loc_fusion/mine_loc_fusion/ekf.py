@@ -5,7 +5,6 @@ expected to stay while the covariance grows. A step is a velocity measurement al
 the odom frame in the map.
 """
 
-import copy
 import math
 from dataclasses import dataclass
 
@@ -16,15 +15,15 @@ from mine_loc_core.stamps import to_ns, to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_fusion.estimate import (
     Array,
-    EpochInputs,
     Estimate,
     PositionFix,
     StepFix,
     is_position,
     is_step,
+    since_s,
     symmetric,
 )
-from mine_loc_fusion.yaw_alignment import YawAlignment
+from mine_loc_fusion.loosely_coupled import LooselyCoupled
 
 _VELOCITY_FADE_S = 3.0
 _WALKING_SD_MS = 1.0  # prior of a person's velocity
@@ -47,10 +46,11 @@ class EkfSettings:
     """Positions refused for so long start the filter anew."""
 
 
-class Ekf:
+class Ekf(LooselyCoupled):
     """Estimator of one person (see `estimate.Estimator`)."""
 
     def __init__(self, settings: EkfSettings | None = None) -> None:
+        super().__init__()
         self._s = settings or EkfSettings()
         self._gate = chi2_quantile(self._s.gate_probability, 2)
         self._stamp_ns: int | None = None
@@ -60,7 +60,6 @@ class Ekf:
         self._uwb_ns: int | None = None
         self._step_ns: int | None = None
         self._refused_since_ns: int | None = None
-        self._alignment = YawAlignment()
 
     def begin(self, stamp_ns: int, position_m: Array, covariance_m2: Array, yaw: tuple[float, float] | None) -> None:
         """See Estimator."""
@@ -74,35 +73,21 @@ class Ekf:
         self._stamp_ns = stamp_ns
         self._alignment.forget_places()
 
-    def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
-        """See Estimator."""
-        if self._stamp_ns is not None:
-            self._x, self._P = self._predicted(inputs.stamp_ns)
-            self._stamp_ns = max(self._stamp_ns, inputs.stamp_ns)
-        verdicts = [self._use_position(fix, inputs.stamp_ns) for fix in inputs.positions]
-        verdicts += [self._use_step(step, inputs.stamp_ns) for step in inputs.steps]
-        return tuple(verdicts)
-
     def estimate(self, stamp_ns: int) -> Estimate | None:
         """See Estimator."""
         if self._stamp_ns is None:
             return None
         x, P = self._predicted(stamp_ns)
-        since_uwb_s = math.inf if self._uwb_ns is None else to_s(max(0, stamp_ns - self._uwb_ns))
-        since_step_s = math.inf if self._step_ns is None else to_s(max(0, stamp_ns - self._step_ns))
+        since_uwb_s, since_step_s = since_s(self._uwb_ns, stamp_ns), since_s(self._step_ns, stamp_ns)
         yaw = float(x[4]) if self._yaw_known else None
         shared = self._s.position_sd_m**2
         covariance = P[:4, :4] + np.diag([shared, shared, 0.0, 0.0])
         return Estimate(stamp_ns, x[:2], x[2:4], covariance, yaw, since_uwb_s, since_step_s)
 
-    def save(self) -> dict[str, object]:
-        """See Estimator."""
-        return {name: copy.copy(value) for name, value in vars(self).items()} | {"_alignment": self._alignment.copy()}
-
-    def restore(self, saved: dict[str, object]) -> None:
-        """See Estimator."""
-        vars(self).update(saved)
-        self._alignment = self._alignment.copy()
+    def _advance(self, stamp_ns: int) -> None:
+        if self._stamp_ns is not None:
+            self._x, self._P = self._predicted(stamp_ns)
+            self._stamp_ns = max(self._stamp_ns, stamp_ns)
 
     def _predicted(self, stamp_ns: int) -> tuple[Array, Array]:
         assert self._stamp_ns is not None

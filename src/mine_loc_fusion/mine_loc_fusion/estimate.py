@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mine_loc_core.gates import chi2_quantile
+from mine_loc_core.stamps import to_s
 from mine_loc_core.verdicts import Source, Verdict
 from mine_loc_uwb.measurements import Measurements
 
@@ -39,6 +40,14 @@ class StepFix:
 
 
 @dataclass(frozen=True, slots=True)
+class VelocityChange:
+    """By how much the velocity changed in the `interval_s` before: `change_m_s` (3,) in the person's odom frame."""
+
+    change_m_s: Array
+    interval_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class PlaceFix:
     """A place told by something else than ranges: a recognised turn, a coarse region, somebody who knows.
 
@@ -62,6 +71,7 @@ class EpochInputs:
     steps: tuple[StepFix, ...] = ()
     ranges: tuple[Measurements, ...] = ()
     places: tuple[PlaceFix, ...] = ()
+    velocity_changes: tuple[VelocityChange, ...] = ()
 
 
 SOURCE_OF: Mapping[str, Callable[[Any], Source]] = {
@@ -69,6 +79,7 @@ SOURCE_OF: Mapping[str, Callable[[Any], Source]] = {
     "steps": lambda _: Source.STEP,
     "ranges": lambda measurements: Source.TDOA if measurements.shared_offset else Source.RANGE,
     "places": lambda place: place.source,
+    "velocity_changes": lambda _: Source.IMU,
 }
 """The kind of each of an epoch's measurements, by the field that holds it."""
 
@@ -115,6 +126,8 @@ class Estimator(Protocol):
 _FARTHEST_M = 1e8  # beyond any map, grid coordinates included
 _LARGEST_SD_M = 1e4  # a position that is no surer says nothing
 _LONGEST_STEP_M = 5.0
+_LONGEST_CHANGE_S = 1.0
+_LARGEST_ACCELERATION_M_S2 = 100.0  # people do not survive more
 
 
 def is_position(position_m: Array, covariance_m2: Array) -> bool:
@@ -133,6 +146,17 @@ def is_step(step: StepFix) -> bool:
     """Whether this is a step that a person can make, with variances."""
     possible = 0.0 <= step.length_m < _LONGEST_STEP_M and isfinite(step.heading_rad)
     return possible and 0.0 <= step.length_variance_m2 < _LARGEST_SD_M**2 and 0.0 <= step.heading_variance_rad2 < inf
+
+
+def is_velocity_change(change: VelocityChange) -> bool:
+    """Whether this is a change that can happen to a person, over a time in which directions hold."""
+    most_m_s = _LARGEST_ACCELERATION_M_S2 * change.interval_s
+    return 0.0 < change.interval_s <= _LONGEST_CHANGE_S and bool(np.abs(change.change_m_s).max() <= most_m_s)
+
+
+def since_s(then_ns: int | None, now_ns: int) -> float:
+    """Time gone since an instant, inf since None."""
+    return inf if then_ns is None else to_s(max(0, now_ns - then_ns))
 
 
 def ce95_m(covariance_m2: Array) -> float:

@@ -29,6 +29,7 @@ def make_estimator(method: str, systematic_sd_m: float, height_m: float | None, 
     if method != "mine_loc":
         return RIVALS[method]()
     given = TightlyCoupledSettings()
-    stepping = replace(given.stepping, systematic_sd_m=systematic_sd_m)
-    alone = replace(given.alone, systematic_sd_m=systematic_sd_m)
-    return TightlyCoupled(replace(given, stepping=stepping, alone=alone), height_m, area)
+    stepping, carried, alone = (
+        replace(each, systematic_sd_m=systematic_sd_m) for each in (given.stepping, given.carried, given.alone)
+    )
+    return TightlyCoupled(replace(given, stepping=stepping, carried=carried, alone=alone), height_m, area)

@@ -6,7 +6,6 @@ probability p of line of sight. With a residual test, a position farther from Z_
 one without line of sight, whatever its class.
 """
 
-import copy
 import math
 from dataclasses import dataclass
 
@@ -14,8 +13,8 @@ import numpy as np
 
 from mine_loc_core.stamps import to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PositionFix, StepFix, is_position, is_step
-from mine_loc_fusion.yaw_alignment import YawAlignment
+from mine_loc_fusion.estimate import Array, Estimate, PositionFix, StepFix, is_position, is_step, since_s
+from mine_loc_fusion.loosely_coupled import LooselyCoupled
 
 _LONGEST_CARRY_S = 1.0
 """A person walks on at the last step's speed until the next one is reported, no longer."""
@@ -37,10 +36,11 @@ class LosWeightedSettings:
     """Deviations at which the residual test strikes; None = no test."""
 
 
-class LosWeighted:
+class LosWeighted(LooselyCoupled):
     """Estimator of one person (see `estimate.Estimator`)."""
 
     def __init__(self, settings: LosWeightedSettings | None = None) -> None:
+        super().__init__()
         self._s = settings or LosWeightedSettings()
         self._stamp_ns: int | None = None
         self._position_m = np.zeros(2)
@@ -50,7 +50,6 @@ class LosWeighted:
         self._strike_ns: int | None = None
         self._uwb_ns: int | None = None
         self._yaw_rad: float | None = None
-        self._alignment = YawAlignment()
 
     def begin(self, stamp_ns: int, position_m: Array, covariance_m2: Array, yaw: tuple[float, float] | None) -> None:
         """See Estimator."""
@@ -61,13 +60,6 @@ class LosWeighted:
         if yaw is not None:
             self._yaw_rad = yaw[0]
 
-    def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
-        """See Estimator."""
-        self._advance(inputs.stamp_ns)
-        verdicts = [self._use_position(fix, inputs.stamp_ns) for fix in inputs.positions]
-        verdicts += [self._use_step(step, inputs.stamp_ns) for step in inputs.steps]
-        return tuple(verdicts)
-
     def estimate(self, stamp_ns: int) -> Estimate | None:
         """See Estimator."""
         if self._stamp_ns is None:
@@ -75,19 +67,9 @@ class LosWeighted:
         way_m = self._way_m(stamp_ns)
         variance_m2 = self._variance_m2 + self._added_m2(stamp_ns)
         covariance = np.diag([variance_m2, variance_m2, 1.0, 1.0])
-        since_uwb_s = math.inf if self._uwb_ns is None else to_s(max(0, stamp_ns - self._uwb_ns))
-        since_step_s = math.inf if self._strike_ns is None else to_s(max(0, stamp_ns - self._strike_ns))
+        since_uwb_s, since_step_s = since_s(self._uwb_ns, stamp_ns), since_s(self._strike_ns, stamp_ns)
         at = self._position_m + way_m
         return Estimate(stamp_ns, at, self._velocity_ms, covariance, self._yaw_rad, since_uwb_s, since_step_s)
-
-    def save(self) -> dict[str, object]:
-        """See Estimator."""
-        return {name: copy.copy(value) for name, value in vars(self).items()} | {"_alignment": self._alignment.copy()}
-
-    def restore(self, saved: dict[str, object]) -> None:
-        """See Estimator."""
-        vars(self).update(saved)
-        self._alignment = self._alignment.copy()
 
     def _advance(self, stamp_ns: int) -> None:
         if self._stamp_ns is None or stamp_ns <= self._stamp_ns:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from mine_loc_core.parameters import NodeParameters, parameter
 
+_FUTURE_MS = 50.0
 METHODS = ("mine_loc", "los_weighted", "los_weighted_residual", "robust_kf", "ekf", "adaptive_ekf")
 
 
@@ -17,7 +18,9 @@ class SynchroniserParameters(NodeParameters):
     history_s: float = parameter(
         2.0, "inputs older than the last epoch by more are stale", unit="s", low=0.1, high=30.0
     )
-    future_ms: float = parameter(50.0, "stamps ahead of now by more are refused", unit="ms", low=0.0, high=10_000.0)
+    future_ms: float = parameter(
+        _FUTURE_MS, "stamps ahead of now by more are refused", unit="ms", low=0.0, high=10_000.0
+    )
     max_open: int = parameter(64, "open epochs a person; the oldest goes out when there are more", low=1, high=1024)
 
 
@@ -49,4 +52,7 @@ class FusionParameters(NodeParameters):
     )
     lost_ce95_m: float = parameter(50.0, "a circle of 95 % beyond it means lost", unit="m", low=1.0, high=1000.0)
     coast_period_s: float = parameter(0.2, "outputs without inputs come this often", unit="s", low=0.02, high=5.0)
+    future_ms: float = parameter(
+        _FUTURE_MS, "set_pose with a stamp ahead of now by more is refused", unit="ms", low=0.0, high=10_000.0
+    )
     history_s: float = parameter(2.0, "late inputs are corrected this far back", unit="s", low=0.1, high=30.0)

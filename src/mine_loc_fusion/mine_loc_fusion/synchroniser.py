@@ -28,6 +28,7 @@ class Kind(Enum):
     LINK_STATE = "link_states"
     STEP = "steps"
     LANDMARK = "landmark_fixes"
+    VELOCITY_CHANGE = "velocity_changes"
 
 
 CAPACITY = {
@@ -37,10 +38,13 @@ CAPACITY = {
     Kind.LINK_STATE: 64,
     Kind.STEP: 16,
     Kind.LANDMARK: 4,
+    Kind.VELOCITY_CHANGE: 16,
 }
 """Bounds of the sequences in mine_loc_interfaces/Epoch."""
 
 _COMPANIONS = (Kind.UWB_POSE, Kind.LINK_STATE)
+_WAITING = (Kind.RANGES, *_COMPANIONS, Kind.VELOCITY_CHANGE)
+"""A change of velocity is told at once: it waits too, lest it takes a round along that still does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +122,7 @@ class Synchroniser:
             person.link_state_heard_ns = now_ns
         epoch = person.open.get(item.stamp_ns)
         if epoch is None:
-            wait_ns = self._companion_wait_ns if item.kind in (Kind.RANGES, *_COMPANIONS) else 0
+            wait_ns = self._companion_wait_ns if item.kind in _WAITING else 0
             epoch = person.open[item.stamp_ns] = _Open(item.stamp_ns, now_ns + wait_ns, item.links)
             self._waiting[item.person] = None
         epoch.links = max(epoch.links, item.links)

@@ -15,7 +15,7 @@ from mine_loc_core.gates import chi2_quantile
 from mine_loc_core.stamps import to_ns, to_s
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_core.walkable_area import WalkableArea
-from mine_loc_fusion import step_kernel
+from mine_loc_fusion import inertial_kernel, step_kernel
 from mine_loc_fusion.estimate import (
     SOURCE_OF,
     Array,
@@ -23,11 +23,15 @@ from mine_loc_fusion.estimate import (
     Estimate,
     PlaceFix,
     StepFix,
+    VelocityChange,
     is_position,
     is_step,
+    is_velocity_change,
+    since_s,
     symmetric,
 )
 from mine_loc_fusion.gallery_walls import between_walls, inside
+from mine_loc_fusion.inertial_prediction import InertialPrediction
 from mine_loc_fusion.step_kernel import OWN_STATES, SCALE, YAW
 from mine_loc_fusion.tightly_coupled_settings import TightlyCoupledSettings
 from mine_loc_fusion.yaw_alignment import YawAlignment
@@ -63,14 +67,18 @@ class TightlyCoupled:
         self._height_m = height_m
         self._area = area
         self._gate = chi2_quantile(self._s.gate_probability, 2)
-        self._tracker = RobustTracker(self._s.alone, OWN_STATES)
+        self._believed = self._s.alone
+        self._tracker = RobustTracker(self._believed, OWN_STATES)
         self._systematic_m2 = np.zeros((2, 2))
         self._starts = 0
         self._alignment = YawAlignment()
+        self._inertial = InertialPrediction(self._s.inertial)
         self._yaw_known = False
         self._stamp_ns = 0
         self._strike_ns: int | None = None
         self._step_ns: int | None = None
+        self._velocity_ns: int | None = None
+        self._change_ns: int | None = None
         self._uwb_ns: int | None = None
         self._ranges_ns: int | None = None
         self._region_ns: int | None = None
@@ -92,7 +100,7 @@ class TightlyCoupled:
     def update(self, inputs: EpochInputs) -> tuple[Verdict, ...]:
         """See Estimator."""
         self._advance(inputs.stamp_ns)
-        verdicts: list[Verdict] = []
+        verdicts = [self._use_velocity_change(change, inputs.stamp_ns) for change in inputs.velocity_changes]
         for measurements in inputs.ranges:
             verdicts += self._use_ranges(measurements)
         for fix in inputs.positions:
@@ -118,10 +126,10 @@ class TightlyCoupled:
             covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
         covariance[:2, :2] += self._systematic_m2
         if self._area is not None:
-            doubted = _since_s(self._rock_ns, stamp_ns) < self._s.in_rock_counts_s
+            doubted = since_s(self._rock_ns, stamp_ns) < self._s.in_rock_counts_s
             position, velocity, covariance = between_walls(position, velocity, covariance, self._area, doubted=doubted)
         yaw = float(tracker.x[self._own + YAW]) if self._yaw_known else None
-        uwb_s, step_s, region_s = (_since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
+        uwb_s, step_s, region_s = (since_s(each, stamp_ns) for each in (self._uwb_ns, self._step_ns, self._region_ns))
         height_m = None if d == 2 else float(tracker.x[2])
         return Estimate(stamp_ns, position, velocity, covariance, yaw, uwb_s, step_s, region_s, height_m)
 
@@ -155,10 +163,28 @@ class TightlyCoupled:
         tracker.advance(stamp_ns)
         yaw_m2, scale_m2 = self._s.yaw_walk_sd_rad**2 * gone_s, self._s.scale_walk_sd**2 * gone_s
         step_kernel.drift(tracker.P, tracker.first_link, yaw_m2, scale_m2)
-        stepping = self._yaw_known and _since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
-        if stepping != tracker.motion_known:
-            tracker.motion_known = stepping
-            tracker.believe(self._s.stepping if stepping else self._s.alone)
+        tracker.motion_known = self._yaw_known and since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
+        accelerating = since_s(self._change_ns, stamp_ns) < self._s.motion_known_s
+        believed = self._s.stepping if tracker.motion_known else self._s.carried if accelerating else self._s.alone
+        if believed is not self._believed:
+            self._believed = believed
+            tracker.believe(believed)
+
+    def _use_velocity_change(self, change: VelocityChange, stamp_ns: int) -> Verdict:
+        """Where steps tell the motion a waist swings with each: they are better."""
+        if not is_velocity_change(change):
+            return Verdict(Source.IMU, 0, Reason.INVALID)
+        if not self._tracker.started:
+            return Verdict(Source.IMU, 0, Reason.NOT_INITIALISED)
+        if self._tracker.motion_known:
+            return Verdict(Source.IMU, 0, Reason.DUPLICATE)
+        gone_s = None if self._velocity_ns is None else to_s(stamp_ns - self._velocity_ns)
+        self._velocity_ns = stamp_ns
+        verdict = self._inertial.take(self._tracker, change, gone_s, yaw_known=self._yaw_known)
+        if verdict.accepted:
+            self._change_ns = stamp_ns
+        self._yaw_known = self._yaw_known or self._inertial.settle_yaw(self._tracker)
+        return verdict
 
     def _use_ranges(self, measurements: Measurements) -> list[Verdict]:
         solution = self._tracker.solve(measurements)
@@ -215,6 +241,7 @@ class TightlyCoupled:
             tracker.P[own + SCALE, own + SCALE] = self._s.scale_sd**2
         self._starts = tracker.starts
         self._alignment.forget_places()
+        self._velocity_ns = None
         self._strike_ns = None
         self._stamp_ns = stamp_ns
 
@@ -263,6 +290,11 @@ def rehearse(dimensions: int) -> None:
     anchors_m = np.array([[9.0, 0.0, 2.0], [0.0, 9.0, 3.0]])
     none, plane_m = np.full(2, math.nan), 1.0 if dimensions == 2 else None
     ids, range_m = np.array([1, 2], np.uint64), np.linalg.norm(anchors_m, axis=1)
+    change = VelocityChange(np.zeros(3), 0.1)
+    for stamp_ns in (to_ns(0.1), to_ns(0.2)):  # before the steps, beside which they are not used
+        estimator.update(EpochInputs(stamp_ns, velocity_changes=(change,)))
+    tracker = estimator._tracker  # noqa: SLF001 its own
+    inertial_kernel.settle_yaw(np.ones_like(tracker.x), tracker.P.copy(), dimensions, tracker.first_link)
     step = StepFix(0.7, 0.01, 0.0, 0.01, 0.5)
     for stamp_ns in (to_ns(0.5), to_ns(1.0)):
         measurements = Measurements(
@@ -270,10 +302,6 @@ def rehearse(dimensions: int) -> None:
         )
         place = PlaceFix(Source.LANDMARK, at_m, spread_m2)
         estimator.update(EpochInputs(stamp_ns, steps=(step,), ranges=(measurements,), places=(place,)))
-
-
-def _since_s(then_ns: int | None, now_ns: int) -> float:
-    return math.inf if then_ns is None else to_s(max(0, now_ns - then_ns))
 
 
 def _covariance_or_none(difference_m2: Array) -> Array:

@@ -1,8 +1,9 @@
 """What the `tightly_coupled` filter is told of the person and the radio, in physical units."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from mine_loc_fusion.inertial_prediction import InertialSettings
 from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 
 
@@ -24,14 +25,22 @@ def _stepping() -> RobustTrackerSettings:
     )
 
 
+def _carried() -> RobustTrackerSettings:
+    """The radio, where accelerations tell the motion: as with steps, but what obstructs a link is passed sooner."""
+    return replace(_stepping(), nlos_time_s=1.0, bias_time_s=2.0)
+
+
 @dataclass(frozen=True, slots=True)
 class TightlyCoupledSettings:
     """Chosen on the tuning seeds of bench/fusion_scenes; docs/fusion.md says how."""
 
     stepping: RobustTrackerSettings = field(default_factory=_stepping)
     """Of ranges while steps tell the motion."""
+    carried: RobustTrackerSettings = field(default_factory=_carried)
+    """Of ranges while there are no steps, but changes of velocity."""
     alone: RobustTrackerSettings = field(default_factory=lambda: RobustTrackerSettings(restart_after_s=math.inf))
     """Of ranges while they are all there is."""
+    inertial: InertialSettings = field(default_factory=InertialSettings)
     step_along_sd: float = 0.07
     """Of a step's length, relative to it, beyond what all steps of the person share."""
     step_across_sd_m: float = 0.04

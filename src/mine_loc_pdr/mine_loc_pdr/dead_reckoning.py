@@ -27,6 +27,7 @@ from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
 from mine_loc_pdr.rest import RestDetector
 from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, PeakStepDetector, Step, StepDetector
 from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2
+from mine_loc_pdr.velocity_changes import VelocityChange, VelocityChanges
 
 INITIAL_SPAN_NS = 500 * NS_PER_MS  # of force averaged for the first horizon
 LONGEST_DT_NS = 200 * NS_PER_MS  # beyond it the motion in between is unknown
@@ -117,12 +118,16 @@ class PedestrianDeadReckoning:
         self._step_heading_rad = 0.0
         self._interval_before_s: float | None = None
         self._x_m = self._y_m = self._way_m = 0.0
+        self._changes = VelocityChanges()
+        self.velocity_change: VelocityChange | None = None
+        """That the last sample completed, if any."""
         self.magnetic = MagneticHeading()
         self.step_count = 0
         self.faults: Counter[str] = Counter()
 
     def push(self, sample: ImuSample) -> StepEvent | None:
         """Take the next sample and return the step it completes, if any; bad samples are counted and dropped."""
+        self.velocity_change = None
         if fault := _fault(sample):
             self.faults[fault] += 1
             return None
@@ -222,6 +227,7 @@ class PedestrianDeadReckoning:
         self._detector.reset()
         self._rest.reset()
         self._motion.clear()
+        self._changes.interrupted()
         self.magnetic.interrupted()
         self._interval_before_s = None
 
@@ -236,7 +242,12 @@ class PedestrianDeadReckoning:
             self._learn_bias(attitude, resting_rate)
         self._remember(sample, attitude.orientation_imu)
         step = self._detector.push(sample.stamp_ns, attitude.motion(sample.rate_rad_s, sample.force_m_s2))
-        return None if step is None else self._walk(attitude, step)
+        if step is not None:
+            self._changes.stepped(sample.stamp_ns)
+            return self._walk(attitude, step)
+        orientation = attitude.orientation_imu
+        self.velocity_change = self._changes.push(sample.stamp_ns, dt_s, orientation, sample.force_m_s2)
+        return None
 
     def _remember(self, sample: ImuSample, orientation: Quaternion) -> None:
         self._motion.append((sample.stamp_ns, orientation, sample.force_m_s2))

@@ -86,6 +86,16 @@ class RobustTracker:
         """Whether there is a place."""
         return self.starts > 0
 
+    def add_states(self, count: int) -> None:
+        """Make room for more states of the caller, all 0, before those that are there."""
+        own, size = 2 * self.dimensions + 1, len(self.x)
+        old = np.r_[:own, own + count : size + count]
+        x, P = np.zeros(size + count), np.zeros((size + count, size + count))
+        x[old], P[np.ix_(old, old)] = self.x, self.P
+        self.x, self.P = x, P
+        self._own_states += count
+        self.first_link += count
+
     def advance(self, stamp_ns: int) -> None:
         """Predict the state to an instant; to an earlier one than that of the state nothing changes."""
         gone_s = (stamp_ns - self._stamp_ns) / NS_PER_S
@@ -98,10 +108,12 @@ class RobustTracker:
         gone_s = max(measurements.stamp_ns - self._round_ns, 0) / NS_PER_S
         if not self.started or gone_s > self._settings.restart_after_s:
             return self._begin(measurements)
-        self.advance(measurements.stamp_ns)
-        found = self._place_within_wide_spread(measurements)
-        if found is not None:
-            return self._begin_at(found, measurements)
+        if (measurements.stamp_ns - self._trusted_ns) / NS_PER_S >= _COASTED_S:
+            self.advance(measurements.stamp_ns)
+            found = self._place_within_wide_spread(measurements)
+            if found is not None:
+                return self._begin_at(found, measurements)
+        ahead_s = max(measurements.stamp_ns - self._stamp_ns, 0) / NS_PER_S
         slots = self._slots_of(measurements.anchor_ids)
         codes, deviances = np.empty(len(slots), np.int64), np.empty(len(slots))
         quality, claimed_m2 = np.empty(tracker_round.QUALITIES), np.zeros((3, 3))
@@ -109,9 +121,10 @@ class RobustTracker:
         tracker_round.take_round(
             self.x, self.P, measurements.dimensions, self.first_link, measurements.anchors_m, slots,
             measurements.range_m, measurements.variance_m2, measurements.since_s, measurements.plane_m,
-            measurements.los_probability, measurements.receive_power_dbm, self._link_nlos, gone_s, offset_unknown,
-            self._gate, self._noise, codes, deviances, quality, claimed_m2,
+            measurements.los_probability, measurements.receive_power_dbm, self._link_nlos, ahead_s, gone_s,
+            offset_unknown, self._gate, self._noise, codes, deviances, quality, claimed_m2,
         )  # fmt: skip
+        self._stamp_ns = max(self._stamp_ns, measurements.stamp_ns)
         self._round_ns = measurements.stamp_ns
         reasons = tuple([_REASON[code] for code in codes.tolist()])
         used, rms, dilution, short, holding = quality.tolist()
@@ -163,9 +176,8 @@ class RobustTracker:
     def _place_within_wide_spread(self, measurements: Measurements) -> Consensus | None:
         """Where ranges agree, if that is within a spread from coasting that is better not linearised over."""
         d = measurements.dimensions
-        coasted_s = (measurements.stamp_ns - self._trusted_ns) / NS_PER_S
         variance = float(np.trace(self.P[:d, :d]))
-        if coasted_s < _COASTED_S or len(measurements) <= d or variance <= _WIDE_M**2:
+        if len(measurements) <= d or variance <= _WIDE_M**2:
             return None
         found = self._agreed_place(measurements)
         if found is None:

@@ -23,6 +23,7 @@ from mine_loc_uwb.tracker_kernel import (
     TOP_SPEED,
     Integers,
     open_offset,
+    predict,
     take_level,
     take_range,
 )
@@ -53,6 +54,7 @@ def take_round(
     los_probability: Array,
     level_dbm: Array,
     link_nlos: Array,
+    ahead_s: float,
     gone_s: float,
     offset_unknown: int,
     gate: float,
@@ -62,7 +64,7 @@ def take_round(
     quality: Array,
     claimed_m2: Array,
 ) -> None:
-    """Take all ranges of a round, `gone_s` after the last one, into a state predicted to it.
+    """Take all ranges of a round, `gone_s` after the last one, into a state that is to be predicted to it by `ahead_s`.
 
     What fits best is taken first, so that it decides what becomes of the rest. `link_nlos` (L,) is how far each link is
     believed to be obstructed by its own ranges; belief fades to the share of links that are. A judgement of the link
@@ -71,6 +73,8 @@ def take_round(
     alike would drag the track. Leaves in `codes` and `deviances` (n,) what became of each range, in `quality` how good
     the round was, in `claimed_m2` (3, 3), zeros before, the covariance to claim.
     """
+    if ahead_s > 0.0:
+        predict(x, P, dimensions, first_link, ahead_s, noise)
     work = np.empty((3, len(x)))
     x_before, P_before, nlos_before = x.copy(), P.copy(), link_nlos.copy()
     fresh = min(gone_s / noise[NLOS_TIME], 1.0)

@@ -8,7 +8,7 @@ from walks import HALL, HEIGHT_M, T0
 from mine_loc_core.site import Anchor
 from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_core.verdicts import Source
-from mine_loc_fusion.estimate import EpochInputs, PlaceFix, PositionFix, StepFix
+from mine_loc_fusion.estimate import EpochInputs, PlaceFix, PositionFix, StepFix, VelocityChange
 from mine_loc_uwb.range_intake import MeasuredRange, RangeIntake
 
 _ODD = (0.0, -0.0, math.nan, math.inf, -math.inf, 1e300, -1e300, 1e30, 1e7, -1e7, 1e-300, 1e-30, 1e-9, 5e-324)
@@ -42,6 +42,10 @@ class Garbage:
         across, again = (self.number(0.5 * min(abs(a), 1e3)) for _ in range(2))
         return np.array([[a, across], [across if self.rng.random() < 0.5 else again, b]])
 
+    def interval(self):
+        """Often that of the epochs."""
+        return 0.1 if self.rng.random() < 0.7 else self.positive(0.5)
+
     def epoch(self):
         rng = self.rng
         self.stamp_ns += int(rng.choice([0, 1, 100, 500, 2_000, 60_000])) * NS_PER_MS
@@ -64,6 +68,10 @@ class Garbage:
             (measured,) if len(measured) else (),
             tuple(
                 PlaceFix(Source(rng.choice([Source.LANDMARK, Source.REGION])), self.place(), self.spread())
+                for _ in range(rng.integers(0, 3))
+            ),
+            tuple(
+                VelocityChange(np.array([self.number(), self.number(), self.number()]), self.interval())
                 for _ in range(rng.integers(0, 3))
             ),
         )

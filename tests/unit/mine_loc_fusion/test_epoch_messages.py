@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from geometry_msgs.msg import Vector3
 from mine_loc_interfaces import msg
 
 from mine_loc_core.nodes.conversions import to_time
@@ -106,6 +107,13 @@ def test_steps_keep_their_figures_and_their_order():
     found = (first.length_m, first.length_variance_m2, first.heading_rad, first.heading_variance_rad2, first.interval_s)
     assert found == pytest.approx((0.75, 0.01, 0.5, 0.02, 0.55))
     assert math.isnan(second.interval_s)
+
+
+def test_changes_of_velocity_keep_their_figures_and_the_time_that_they_took():
+    change = msg.VelocityChange(interval=0.1, change=Vector3(x=0.1, y=-0.2, z=0.3))
+    (found,) = inputs_of(epoch(velocity_changes=[change]))[0].velocity_changes
+    assert found.change_m_s.tolist() == [0.1, -0.2, 0.3]
+    assert found.interval_s == pytest.approx(0.1)
 
 
 def test_of_landmark_fixes_only_those_that_match_are_places():

@@ -73,6 +73,17 @@ def test_a_round_whose_links_are_judged_does_not_wait_for_its_position():
     assert not subject.waiting
 
 
+def test_a_change_of_velocity_does_not_take_a_round_along_that_waits_for_its_links():
+    subject = synchroniser()
+    subject.push(item(Kind.LINK_STATE, 0, source=1), at(1))
+    subject.push(item(Kind.RANGES, 0, links=2), at(2))
+    assert subject.push(item(Kind.VELOCITY_CHANGE, 3), at(4)) == ([], Reason.ACCEPTED)
+    (epoch,), _ = subject.push(item(Kind.LINK_STATE, 0, source=2), at(5))
+    assert set(epoch.inputs) == {Kind.RANGES, Kind.LINK_STATE}
+    (change,) = subject.poll(at(12))
+    assert (change.stamp_ns, change.late, set(change.inputs)) == (at(3), False, {Kind.VELOCITY_CHANGE})
+
+
 def test_those_who_wait_are_polled_until_their_time_is_over_and_forgotten_with_a_reset():
     subject = synchroniser()
     for person in ("ann", "bob"):

@@ -1,13 +1,13 @@
 """The default fusion: how it starts, what it learns by walking, what it carries through, what it refuses."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
 from garbage import Garbage
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from subjects import own, reasons, state_bytes, walked
 from walks import HALL, HEIGHT_M, T0, Walk, at, is_covariance, place_fix, position_fix, ranges_to, step_fix
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
@@ -18,30 +18,6 @@ from mine_loc_fusion.step_kernel import SCALE, YAW
 from mine_loc_fusion.tightly_coupled import TightlyCoupled
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def walked(seconds=30.0, subject=None, **walk):
-    """Somebody who has walked for so long, and the walk."""
-    walk, subject = Walk(**walk), subject or TightlyCoupled()
-    walk.play(subject, seconds)
-    return subject, walk
-
-
-def own(subject, which):
-    """Value and standard deviation of one of its own states."""
-    place = subject._own + which
-    return float(subject._tracker.x[place]), math.sqrt(subject._tracker.P[place, place])
-
-
-def state_bytes(subject):
-    """All that it knows, as bytes."""
-    saved = vars(subject.save()).copy()
-    saved["_tracker"] = vars(saved["_tracker"])
-    return pickle.dumps({name: value for name, value in saved.items() if name != "_s"})
-
-
-def reasons(verdicts):
-    return [verdict.reason for verdict in verdicts]
 
 
 # Starting.
@@ -325,8 +301,8 @@ def test_whatever_it_is_told_the_estimate_is_finite_and_its_covariance_one(space
     for _ in range(30):
         epoch = garbage.epoch()
         verdicts = subject.update(epoch)
-        measured = sum(len(each) for each in epoch.ranges)
-        assert len(verdicts) == len(epoch.positions) + len(epoch.steps) + len(epoch.places) + measured
+        others = (epoch.positions, epoch.steps, epoch.places, epoch.velocity_changes)
+        assert len(verdicts) == sum(len(each) for each in (*others, *epoch.ranges))
         for later_ns in (0, NS_PER_S):
             estimate = subject.estimate(epoch.stamp_ns + later_ns)
             if estimate is None:

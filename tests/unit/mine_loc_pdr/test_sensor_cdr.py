@@ -6,11 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mine_loc_pdr.dead_reckoning import FieldSample, ImuSample
-from mine_loc_pdr.sensor_cdr import field_sample, imu_sample
+pytest.importorskip("rclpy")
 
-serialization = pytest.importorskip("rclpy.serialization")
-messages = pytest.importorskip("sensor_msgs.msg")
+import sensor_msgs.msg as messages
+from rclpy import serialization
+from std_msgs.msg import Header
+
+from mine_loc_core.nodes.conversions import to_time
+from mine_loc_pdr.dead_reckoning import FieldSample, ImuSample
+from mine_loc_pdr.n100_stream import ImuMeasurement
+from mine_loc_pdr.nodes.messages import Covariances, to_imu
+from mine_loc_pdr.sensor_cdr import ImuWriter, field_sample, imu_sample
 
 vectors = st.tuples(*[st.floats(-1e3, 1e3)] * 3)
 frames = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=30)
@@ -30,6 +36,17 @@ def imu_message(frame, stamp, rate, force):
 def test_stamp_rate_and_force_are_those_of_the_message_whatever_its_frame_is_called(frame, stamp, rate, force):
     sample = imu_sample(imu_message(frame, stamp, rate, force))
     assert sample == ImuSample(stamp[0] * 10**9 + stamp[1], rate, force)
+
+
+@given(frames, st.integers(0, 2**31 * 10**9 - 1), st.none() | st.tuples(*[st.floats(-1.0, 1.0)] * 4), vectors, vectors)
+def test_a_written_sample_is_the_message_that_the_middleware_would_write(frame, stamp_ns, orientation, rate, force):
+    spreads = [[float(each + place) for place in range(9)] for each in (10, 20, 30)]
+    covariances = Covariances(orientation=spreads[0], rate=spreads[1], force=spreads[2], field=9 * [0.0])
+    measurement = ImuMeasurement(stamp_ns, rate, force, (0.0, 0.0, 0.0), orientation, None)
+    wanted = to_imu(measurement, Header(stamp=to_time(stamp_ns), frame_id=frame), covariances)
+    written = ImuWriter(frame, *spreads).write(stamp_ns, orientation, rate, force)
+    assert serialization.deserialize_message(written, messages.Imu) == wanted
+    assert len(written) == len(serialization.serialize_message(wanted))  # but for padding, whose bytes are anything
 
 
 @given(frames, vectors)

@@ -163,15 +163,14 @@ def test_a_range_believed_obstructed_pulls_less_than_one_believed_clear():
     assert moved[0] > 1.5 * moved[1] > 1.5 * moved[2]
 
 
-def play(x, P, ranges, *, los=math.nan, link_nlos=None, gone_s=0.1, offset_unknown=0, gate=15.0):
+def play(x, P, ranges, *, los=math.nan, link_nlos=None, ahead_s=0.1, gone_s=0.1, offset_unknown=0, gate=15.0):
     """A round of ranges of the room, `gone_s` after the last; codes, deviances and quality."""
     count = len(ranges)
-    kernel.predict(x, P, 2, 5, gone_s, NOISE)
     codes, deviances, quality = np.empty(count, np.int64), np.empty(count), np.empty(tracker_round.QUALITIES)
     tracker_round.take_round(
         x, P, 2, 5, ROOM[:count], np.arange(count), np.asarray(ranges, float), np.full(count, 0.01), np.zeros(count),
         1.0, np.full(count, los), np.full(count, math.nan), np.full(count, 0.5) if link_nlos is None else link_nlos,
-        gone_s, offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((3, 3)),
+        ahead_s, gone_s, offset_unknown, gate, NOISE, codes, deviances, quality, np.zeros((3, 3)),
     )  # fmt: skip
     return codes, deviances, quality
 
@@ -188,6 +187,16 @@ def test_arrivals_of_a_blink_may_all_be_shifted_alike(seed, shift_m):
         results.append((codes, deviances, np.delete(x, 4), P))
     for here, shifted in zip(*results, strict=True):
         assert here == pytest.approx(shifted, rel=1e-6, abs=1e-6)
+
+
+def test_a_round_ahead_of_the_state_is_taken_as_by_a_state_predicted_to_it():
+    ranges = distances(ROOM, (8.2, 6.1, 1.0))
+    (x, P), (other_x, other_P) = state(7, 2, len(ROOM)), state(7, 2, len(ROOM))
+    kernel.predict(other_x, other_P, 2, 5, 0.1, NOISE)
+    for here, there in zip(play(x, P, ranges), play(other_x, other_P, ranges, ahead_s=0.0), strict=True):
+        assert here.tolist() == there.tolist()
+    assert (x.tolist(), P.tolist()) == (other_x.tolist(), other_P.tolist())
+    assert x.tolist() != state(7, 2, len(ROOM))[0].tolist()
 
 
 def test_a_common_shift_of_ranges_that_are_no_arrivals_is_noticed():

@@ -20,7 +20,7 @@ from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_S, to_ns
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
 from mine_loc_core.verdicts import Source
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import Estimate, is_position
@@ -40,7 +40,7 @@ from mine_loc_uwb.range_intake import RangeIntake
 
 _PERIOD_S = 1.0
 _PRESENT = (msg.CoarseRegion.NEW, msg.CoarseRegion.KEPT)
-_SOURCES = (Source.RANGE, Source.TDOA, Source.UWB_POSE, Source.STEP, Source.LANDMARK, Source.REGION)
+_SOURCES = (Source.RANGE, Source.TDOA, Source.UWB_POSE, Source.STEP, Source.LANDMARK, Source.REGION, Source.IMU)
 
 
 class Fusion(NodeBase):
@@ -240,8 +240,12 @@ class Fusion(NodeBase):
         position_m, covariance_m2 = to_place(request.pose.pose)
         if not is_position(position_m, covariance_m2):
             return False, "pose: not a place with a covariance; allowed: finite, positive definite in x and y"
-        tracked.begin(stamp_ns or self.now_ns(), position_m, covariance_m2, None)
-        self._publish([tracked], self.now_ns())
+        now_ns, most_ms = self.now_ns(), self.parameters.future_ms
+        if stamp_ns > now_ns + round(most_ms * NS_PER_MS):
+            ahead_ms = (stamp_ns - now_ns) / NS_PER_MS
+            return False, f"stamp {ahead_ms:.0f} ms ahead of now; allowed: {most_ms:g} ms (future_ms)"
+        tracked.begin(stamp_ns or now_ns, position_m, covariance_m2, None)
+        self._publish([tracked], now_ns)
         return True, f"{request.person} is at {position_m[0]:.2f}, {position_m[1]:.2f}"
 
     def _toggle_sensor(self, request: ToggleSensor.Request) -> tuple[bool, str]:

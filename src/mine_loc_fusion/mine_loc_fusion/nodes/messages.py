@@ -8,7 +8,16 @@ from mine_loc_interfaces import msg
 
 from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
 from mine_loc_core.verdicts import Reason, Source, Verdict
-from mine_loc_fusion.estimate import Array, EpochInputs, Estimate, PlaceFix, PositionFix, StepFix, ce95_m
+from mine_loc_fusion.estimate import (
+    Array,
+    EpochInputs,
+    Estimate,
+    PlaceFix,
+    PositionFix,
+    StepFix,
+    VelocityChange,
+    ce95_m,
+)
 from mine_loc_fusion.mode import Mode
 from mine_loc_uwb.nodes.solver_messages import measured_arrivals, measured_ranges
 from mine_loc_uwb.range_intake import RangeIntake
@@ -49,6 +58,7 @@ def to_inputs(
             for step in epoch.steps
         ),
         ranges=tuple(measurements for measurements in taken if len(measurements)),
+        velocity_changes=tuple(_to_change(change) for change in epoch.velocity_changes),
         places=tuple(_to_place(fix) for fix in epoch.landmark_fixes if fix.verdict == msg.LandmarkFix.MATCHED),
     )
     return inputs, tuple(refused)
@@ -68,6 +78,10 @@ def to_place(pose: PoseWithCovariance) -> tuple[Array, Array]:
 def _to_place(fix: msg.LandmarkFix) -> PlaceFix:
     covariance = np.asarray(fix.position_covariance).reshape(3, 3)
     return PlaceFix(Source.LANDMARK, np.array([fix.position.x, fix.position.y]), covariance[:2, :2].copy())
+
+
+def _to_change(change: msg.VelocityChange) -> VelocityChange:
+    return VelocityChange(np.array([change.change.x, change.change.y, change.change.z]), change.interval)
 
 
 def to_region(region: msg.CoarseRegion) -> PlaceFix:

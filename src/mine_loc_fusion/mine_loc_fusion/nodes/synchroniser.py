@@ -52,6 +52,12 @@ class SynchroniserNode(NodeBase):
         )
         self.subscribe(msg.Step, "pdr/steps", lambda m: self._on_person(Kind.STEP, m, m.count), EVENTS)
         self.subscribe(msg.LandmarkFix, "pdr/landmark_fix", lambda m: self._on_person(Kind.LANDMARK, m, 0), EVENTS)
+        self.subscribe(
+            msg.VelocityChange,
+            "pdr/velocity_changes",
+            lambda m: self._on_person(Kind.VELOCITY_CHANGE, m, m.count),
+            EVENTS,
+        )
 
     def parameters_changed(self) -> None:
         """New limits start with an empty buffer."""

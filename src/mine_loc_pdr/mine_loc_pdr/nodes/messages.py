@@ -32,9 +32,14 @@ class Covariances:
         )
 
 
+def imu_frame(person: str) -> str:
+    """The frame of what `person` wears."""
+    return f"{person}/imu_link"
+
+
 def to_header(measurement: ImuMeasurement, person: str) -> Header:
     """Stamp and frame of a measurement of what `person` wears."""
-    return Header(stamp=to_time(measurement.stamp_ns), frame_id=f"{person}/imu_link")
+    return Header(stamp=to_time(measurement.stamp_ns), frame_id=imu_frame(person))
 
 
 def to_imu(measurement: ImuMeasurement, header: Header, covariances: Covariances) -> Imu:

@@ -1,6 +1,7 @@
 """Node: one N100 on a serial line or TCP bridge to sensor_msgs (REP 145); runs in the namespace of its person."""
 
 import sys
+import threading
 import time
 from collections.abc import Iterable
 
@@ -9,20 +10,19 @@ from sensor_msgs.msg import FluidPressure, Imu, MagneticField
 from mine_loc_core.device_clock import DeviceClock
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.node_base import NodeBase
+from mine_loc_core.nodes.node_base import Host, NodeBase
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.serial_link import SerialLink
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_pdr.n100_stream import ImuMeasurement, N100Stream
-from mine_loc_pdr.nodes.messages import Covariances, to_header, to_imu, to_magnetic_field
+from mine_loc_pdr.nodes.messages import Covariances, imu_frame, to_header, to_magnetic_field
 from mine_loc_pdr.parameters import N100DriverParameters
+from mine_loc_pdr.sensor_cdr import ImuWriter
 
 _TICK_S = 1e-6
 _COUNTER_BITS = 64
 _SILENT_S = 0.8  # with diagnostics once a second, two seconds from the last byte to the error
-# A timer in the events executor costs a third of waking the other one for every few bytes; stamps are the device's.
-_DRAIN_PERIOD_S = 0.005
 
 
 class N100Driver(NodeBase):
@@ -30,6 +30,10 @@ class N100Driver(NodeBase):
 
     default_name = "n100_driver"
     parameter_class = N100DriverParameters
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._decoding = threading.Lock()  # the reader's thread decodes and publishes; the executor does the rest
 
     def configure(self) -> None:
         """Create the publishers; the line is opened when the node becomes active."""
@@ -39,7 +43,6 @@ class N100Driver(NodeBase):
         self._imu = self.publish_to(Imu, "imu/data", EVENTS)
         self._mag = self.publish_to(MagneticField, "imu/mag", EVENTS)
         self._pressure = self.publish_to(FluidPressure, "imu/pressure", EVENTS)
-        self.every(_DRAIN_PERIOD_S, self._drain)
         self.parameters_changed()
 
     def activate(self) -> None:
@@ -47,7 +50,8 @@ class N100Driver(NodeBase):
         self._stream = N100Stream(self._new_clock())
         self._published = self._reported = self._lost = self._field_published = 0
         self._reported_at_s = time.monotonic()
-        self._link = SerialLink(self.parameters.port, self.parameters.baud, clock=self.now_ns, wake=_no_wake)
+        read = self.guarded(self._read, "serial data")
+        self._link = SerialLink(self.parameters.port, self.parameters.baud, clock=self.now_ns, wake=read)
         self._link.start()
 
     def deactivate(self) -> None:
@@ -56,13 +60,15 @@ class N100Driver(NodeBase):
 
     def parameters_changed(self) -> None:
         """Work out the covariances, and the period of the magnetic field."""
-        self._covariances = Covariances.of(self.parameters)
+        self._covariances = c = Covariances.of(self.parameters)
+        self._writer = ImuWriter(imu_frame(self.parameters.person), c.orientation, c.rate, c.force)
         self._field_period_ns = round(NS_PER_S / self.parameters.magnetic_field_rate)
 
     def clock_jumped(self, delta_ns: int) -> None:
         """Map device time anew."""
         del delta_ns
-        self._stream.restart_clock(self._new_clock())
+        with self._decoding:
+            self._stream.restart_clock(self._new_clock())
 
     def health(self) -> Iterable[Health]:
         """The line, what comes over it, and the clock."""
@@ -74,21 +80,24 @@ class N100Driver(NodeBase):
             _TICK_S, _COUNTER_BITS, latency_ns=round(p.latency_ms * NS_PER_MS), bypass=p.stamp_on_arrival
         )
 
-    def _drain(self) -> None:
-        for chunk in self._link.take():
-            if not chunk.data:
-                self._stream.reconnected()
-            for measurement in self._stream.feed(chunk.arrival_ns, chunk.data):
-                self._publish(measurement)
+    def _read(self) -> None:
+        with self._decoding:
+            for chunk in self._link.take():
+                if not chunk.data:
+                    self._stream.reconnected()
+                for measurement in self._stream.feed(chunk.arrival_ns, chunk.data):
+                    self._publish(measurement)
 
     def _publish(self, measurement: ImuMeasurement) -> None:
-        header = to_header(measurement, self.parameters.person)
-        self._imu.publish(to_imu(measurement, header, self._covariances))
+        m = measurement
+        self._imu.publish(self._writer.write(m.stamp_ns, m.orientation, m.rate_rad_s, m.force_m_s2))
         period = measurement.stamp_ns // self._field_period_ns
         if period != self._field_published and self._mag.get_subscription_count():
             self._field_published = period
+            header = to_header(measurement, self.parameters.person)
             self._mag.publish(to_magnetic_field(measurement, header, self._covariances))
         if measurement.pressure_pa is not None:
+            header = to_header(measurement, self.parameters.person)
             self._pressure.publish(FluidPressure(header=header, fluid_pressure=measurement.pressure_pa))
         self._published += 1
 
@@ -133,10 +142,6 @@ class N100Driver(NodeBase):
             return Health("device clock", Level.OK, "no device time yet")
         values = {"offset_ns": stamp.offset_ns, "skew_ppm": f"{stamp.skew_ppm:.1f}", "state": stamp.state.name}
         return Health("device clock", Level.OK, stamp.state.name.lower(), values, self.parameters.port)
-
-
-def _no_wake() -> None:
-    """The queue is looked into by a timer."""
 
 
 def main() -> int:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import TransformStamped, Vector3
 from mine_loc_interfaces.msg import Activity as ActivityMessage
 from mine_loc_interfaces.msg import LandmarkFix, Step, StrideUpdate, UwbPose
+from mine_loc_interfaces.msg import VelocityChange as VelocityChangeMessage
 from mine_loc_interfaces.srv import Reset, SetPose
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
@@ -40,6 +41,7 @@ from mine_loc_pdr.step_model_file import load_step_model, shipped_step_model
 from mine_loc_pdr.steps import PeakStepDetector, StepDetector
 from mine_loc_pdr.stride import stride_model
 from mine_loc_pdr.stride_refinement import Fix, StrideRefiner, StrideScale
+from mine_loc_pdr.velocity_changes import VelocityChange
 
 _PEOPLE_PERIOD_S = 1.0
 _MOUNTING_PERIOD_S = 1.0
@@ -90,7 +92,7 @@ class Track:
         )
         self.published_period = 0
         self.mounting_yaw_rad: float | None = None  # as last published
-        self.samples = 0
+        self.samples = self.changes = 0
 
     def recognise(self, sample: ImuSample, heading_rad: float) -> Activity | None:
         """The activity of the window that ends with a sample, and the waist's heading after it."""
@@ -111,6 +113,7 @@ class Pdr(NodeBase):
         self._models = Models(self._activity_model(), self._step_model())
         self._activities = self.publish_to(ActivityMessage, "pdr/activity", EVENTS)
         self._steps = self.publish_to(Step, "pdr/steps", EVENTS)
+        self._changes = self.publish_to(VelocityChangeMessage, "pdr/velocity_changes", EVENTS)
         self._strides = self.publish_to(StrideUpdate, "pdr/stride_updates", EVENTS)
         self.subscribe(UwbPose, "uwb/pose", self._on_uwb_pose, EVENTS)
         self._landmark_fixes = self.publish_to(LandmarkFix, "pdr/landmark_fix", EVENTS)
@@ -178,6 +181,9 @@ class Pdr(NodeBase):
         if step is not None:
             self._steps.publish(_step(track.person.name, step))
             self._refine_stride(track, step)
+        if (change := track.pdr.velocity_change) is not None:
+            track.changes += 1
+            self._changes.publish(_velocity_change(track, change))
         if (heading_rad := track.pdr.heading_rad) is not None:
             self._follow_heading(track, sample, heading_rad, step)
         period = sample.stamp_ns // self._period_ns
@@ -313,6 +319,17 @@ def _step(person: str, step: StepEvent) -> Step:
         heading_variance=step.heading_variance_rad2,
         position=to_point((step.x_m, step.y_m, 0.0)),
         confidence=step.confidence,
+    )
+
+
+def _velocity_change(track: Track, change: VelocityChange) -> VelocityChangeMessage:
+    x, y, z = change.change_m_s
+    return VelocityChangeMessage(
+        header=Header(stamp=to_time(change.stamp_ns), frame_id=f"{track.person.name}/odom"),
+        person=track.person.name,
+        count=track.changes,
+        interval=change.interval_s,
+        change=Vector3(x=x, y=y, z=z),
     )
 
 
