@@ -52,7 +52,7 @@ BENCHES = (
     Bench("fusion", 15),
     Bench("pdr", 20),
     Bench("los", 15),
-    Bench("sim", 6),
+    Bench("sim", 8),
     Bench("recorder", 8),
     Bench("store", 8, ("--rows", "2000000")),  # ten million, its own default, take longer to fill than all else
     Bench("live", 22),

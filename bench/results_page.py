@@ -49,9 +49,9 @@ def page(spec: Mapping[str, Any], files: Files, facts: RunFacts) -> str:
     head = [
         f"# {spec['title']}",
         "",
-        f"Written by `make bench` on {facts.date}: one run of {minutes:.0f} minutes. Commands are typed after `. ./env.sh`.",
-        "Aims are the project's own. A row without a verdict is a setting, a rival or shown for comparison. What falls short",
-        "of the paper's figure or of the aim says so in bold.",
+        f"Written by `make bench` on {facts.date}: one run of {minutes:.0f} minutes. Commands are typed after",
+        "`. ./env.sh`. Aims are the project's own. A row without a verdict is a setting, a rival or shown for comparison.",
+        "What falls short of the paper's figure or of the aim says so in bold.",
         "",
         f"Aims missed: {missed}. Worse than the paper: {worse}. Figures missing: {missing}.",
         "",
@@ -111,8 +111,8 @@ def _aim(row: Mapping[str, Any]) -> str:
     if "aim" not in row:
         return ""
     if row["better"] == "within":
-        return f"{shown(row['aim'][0])} to {shown(row['aim'][1])}"
-    return f"{'≤' if row['better'] == 'lower' else '≥'} {shown(row['aim'])}"
+        return f"{row['aim'][0]} to {row['aim'][1]}"
+    return f"{'≤' if row['better'] == 'lower' else '≥'} {row['aim']}"
 
 
 def _row(row: Mapping[str, Any], files: Files) -> str:
@@ -121,7 +121,7 @@ def _row(row: Mapping[str, Any], files: Files) -> str:
     if "over" in row:
         divisors = _numbers(file, row["over"])
         values = [value / divisor for value in values for divisor in divisors if divisor]
-    paper = f"{row.get('paper_says', shown(row['paper']))} ({row['source']})" if "paper" in row else ""
+    paper = f"{row.get('paper_says', row.get('paper'))} ({row['source']})" if "paper" in row else ""
     unit = f" [{row['unit']}]" if "unit" in row else ""
     ours, judged = (_range(values), verdict(values, row)) if values else (MISSING, "")
     cells = (row["what"] + unit, paper, _aim(row), ours, _spread(row, file, scale), judged, f"`{row['command']}`")
@@ -166,8 +166,8 @@ def _number(value: Any) -> float | None:
 
 
 def _data(described: Mapping[str, str], there: frozenset[str]) -> list[str]:
-    lines = ["## Data", "", "| set (docs/data.md) | what of | in this run |", "|---|---|---|"]
-    lines += [f"| {name} | {what} | {'read' if name in there else MISSING} |" for name, what in described.items()]
+    lines = ["## Data", "", "| set (`docs/data.md`) | what of | in MINE_LOC_DATA |", "|---|---|---|"]
+    lines += [f"| {name} | {what} | {'yes' if name in there else MISSING} |" for name, what in described.items()]
     return [*lines, "", "Everything else is simulated, with the seeds that the benches name.", ""]
 
 
