@@ -54,7 +54,7 @@ BENCHES = (
     Bench("los", 15),
     Bench("sim", 8),
     Bench("recorder", 8),
-    Bench("store", 8, ("--rows", "2000000")),  # its default of ten million may not fit the limit; the page says how many
+    Bench("store", 8, ("--rows", "2000000")),  # ten million may not fit the limit; the page says how many
     Bench("live", 22),
 )
 """Two searches for a fleet come last: what they may take is what the others leave."""
