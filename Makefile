@@ -1,7 +1,7 @@
 .DEFAULT_GOAL := help
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
-.PHONY: help setup demo test check nightly bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live bench-recorder \
+.PHONY: help setup demo test check nightly bench bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live bench-recorder \
     bench-store lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
@@ -29,6 +29,9 @@ nightly: setup   ## ten million random bytes for the decoders, ten minutes of te
 	@$(run) MINE_LOC_FUZZ_BYTES=10000000 pytest tests/fuzz
 	@$(run) MINE_LOC_SIM_SECONDS=600 pytest --timeout 600 tests/unit/mine_loc_sim/test_byte_streams.py
 	@$(run) MINE_LOC_SOAK_SECONDS=3600 pytest tests/replay/test_soak.py
+
+bench: setup     ## every bench, under 75 minutes on two cores, and docs/results.md from it
+	@$(run) python bench/all.py
 
 bench-sim: setup ## the simulator against its models and real data (bench/results/sim.json)
 	@$(run) python bench/sim.py
