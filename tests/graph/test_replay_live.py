@@ -46,7 +46,10 @@ class Graph:
         words = [sys.executable, "-m", "mine_loc_bringup.main", "replay", str(self.folder / "bag"), "--live", *more]
         with running(words, self.domain, self.folder / "replay.log") as run:
             yield run
-        self.observer.wait_for(lambda: time.monotonic() - self.clock.at_s[-1] > QUIET_S, what="silence on /clock")
+        ended_s = time.monotonic()  # what was said before is heard only from now on
+        self.observer.wait_for(
+            lambda: time.monotonic() - max(self.clock.at_s[-1], ended_s) > QUIET_S, what="silence on /clock"
+        )
 
     def valid_since(self, instant_s: float, later_than_ns: int = 0) -> list[float]:
         """When poses came since then that belong to the present of the clock and rest on ranges."""

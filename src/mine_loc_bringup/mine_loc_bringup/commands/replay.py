@@ -73,8 +73,9 @@ def _refuse(arguments: argparse.Namespace, *options: str) -> None:
     """Options that the other way of replaying has."""
     other = "without --live" if arguments.live else "with --live"
     for option in options:
-        if getattr(arguments, option[2:]):
-            raise ConfigurationError(f"{option}: allowed: {other}")
+        if value := getattr(arguments, option[2:]):
+            shown = option if value is True else f"{option}: {value}"
+            raise ConfigurationError(f"{shown}; allowed: {other}")
 
 
 def _offline(arguments: argparse.Namespace) -> int:
