@@ -18,7 +18,7 @@ from mine_loc_bringup.nodes.offline_replay import OfflineReplay
 from mine_loc_core.stamps import NS_PER_S
 
 WALK = Path(__file__).parent / "walk" / "bag"
-SECONDS = float(os.environ.get("MINE_LOC_SOAK_SECONDS", "180"))
+SECONDS = float(os.environ.get("MINE_LOC_SOAK_SECONDS", "120"))
 ROUND_S = 46
 MOST_GROWN_BYTES = 1_000_000
 
