@@ -2,7 +2,7 @@
 SHELL := bash
 export PYTEST_DEBUG_TEMPROOT = $(CURDIR)/build
 .PHONY: help setup demo test check nightly bench bench-sim bench-uwb bench-los bench-pdr bench-fusion bench-coarse bench-live bench-recorder \
-    bench-store lock clean
+    bench-replay bench-store lock clean
 RECORDING ?=
 DEMO_SECONDS ?= 60
 SITE ?=
@@ -53,6 +53,9 @@ bench-coarse: setup ## coarse regions in paper E's setting, with rivals (bench/r
 
 bench-live: setup ## latency, fleets and load of the live graph on two cores (bench/results/live.json)
 	@$(run) python bench/live.py
+
+bench-replay: setup ## simulated mines from bytes to poses, and the speed of a replay (bench/results/replay.json)
+	@$(run) python bench/replay.py
 
 bench-recorder: setup ## recorders killed under load, cost and rate, the player's punctuality (bench/results/recorder.json)
 	@$(run) python bench/recorder.py

@@ -48,6 +48,7 @@ class Bench:
 
 BENCHES = (
     Bench("coarse", 4),
+    Bench("replay", 8),
     Bench("uwb", 10),
     Bench("fusion", 15),
     Bench("pdr", 20),
