@@ -15,6 +15,7 @@ import yaml
 
 from mine_loc_bringup.bag_messages import BagMessage
 from mine_loc_bringup.message_types import workspace_types
+from mine_loc_bringup.topic_mapping import adapt
 from mine_loc_core.stamps import NS_PER_S
 
 Messages = list[BagMessage]
@@ -143,23 +144,18 @@ clock_step = between(20.0, 25.0, RANGES, lambda message: stamped_later(message, 
 """For 5 s the stamps of the ranges are half a second old."""
 
 
-def _without(*anchor_ids: int) -> Callable[[BagMessage], BagMessage]:
+def _keeping(heard: Callable[[int], bool]) -> Callable[[BagMessage], BagMessage]:
+    """Only the ranges to anchors that are heard."""
+
     def drop(content: Any) -> None:
-        content.ranges = [item for item in content.ranges if item.anchor_id not in anchor_ids]
+        content.ranges = [item for item in content.ranges if heard(item.anchor_id)]
 
     return lambda message: changed(message, drop)
 
 
-def _only_strongest(message: BagMessage) -> BagMessage:
-    def drop(content: Any) -> None:
-        content.ranges = [item for item in content.ranges if item.anchor_id == 260]
-
-    return changed(message, drop)
-
-
-anchors_off_on = between(15.0, 25.0, RANGES, _without(257, 259))
+anchors_off_on = between(15.0, 25.0, RANGES, _keeping(lambda anchor_id: anchor_id not in {257, 259}))
 """Two anchors fall silent for 10 s and come back."""
-single_anchor = between(15.0, 35.0, RANGES, _only_strongest)
+single_anchor = between(15.0, 35.0, RANGES, _keeping(lambda anchor_id: anchor_id == 260))
 """A corridor in which one anchor is heard, for 20 s."""
 
 
@@ -206,8 +202,6 @@ bad_variance = between(20.0, 25.0, RANGES, _set("range_variance", 0.0, -1.0, mat
 
 def indefinite_covariance(messages: Messages) -> Iterator[BagMessage]:
     """Before anything else a coarse region of the person comes whose covariance is none."""
-    from mine_loc_bringup.topic_mapping import adapt  # noqa: PLC0415 only here
-
     region = adapt(None, "mine_loc_interfaces/msg/CoarseRegion", _TYPES, {})
     region.person, region.status = "fitter", 1
     region.center.x, region.center.y, region.center.z = 20.0, 0.0, 0.0
