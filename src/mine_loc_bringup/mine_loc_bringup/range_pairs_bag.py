@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from rosbags.highlevel import AnyReader, AnyReaderError
 
+from mine_loc_bringup.bag_messages import open_bag
+from mine_loc_bringup.message_types import workspace_types
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import load_people
 from mine_loc_core.site import Site, load_site
@@ -46,12 +47,10 @@ def read_bag(bag: Path, site_folder: Path) -> tuple[RangePairs, list[StampLatenc
     site = load_site(site_folder)
     tag_of = {person.name: person.tag_id for person in load_people(site_folder) if person.tag_id}
     tags: dict[int, _Tag] = defaultdict(_Tag)
-    try:
-        with AnyReader([bag]) as reader:
-            for connection, _, raw in reader.messages():
-                _take(connection.topic, lambda c=connection, r=raw: reader.deserialize(r, c.msgtype), tags, tag_of)
-    except (AnyReaderError, OSError, ValueError, KeyError) as error:
-        raise ConfigurationError(f"{bag}: cannot be read as a bag: {error}") from error
+    types = workspace_types()
+    with open_bag(bag) as messages:
+        for each in messages.read(set(messages.topics)):
+            _take(each.topic, lambda m=each: types.deserialize_cdr(m.data, m.type_name), tags, tag_of)
     surveys = [_survey(tag, site) for tag in tags.values() if tag.ranges and len(tag.track) > 1]
     latencies = [each for each in map(_latency, surveys) if each is not None]
     pairs = [_pairs(survey, common_latency_s(latencies)) for survey in surveys]

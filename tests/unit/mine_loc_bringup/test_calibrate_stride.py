@@ -77,7 +77,7 @@ def test_what_is_wrong_is_named(tmp_path: Path, site: Path, capfd: pytest.Captur
         (["--person", "ann", f"{short}"], "BAG=METRES"),
         (["--person", "ann", f"{short}=-3"], "BAG=METRES"),
         (["--person", "ann", f"{other}=20"], "no topic /ann/imu/data"),
-        (["--person", "ann", f"{tmp_path / 'none'}=20"], "cannot be read as a bag"),
+        (["--person", "ann", f"{tmp_path / 'none'}=20"], "allowed: a folder of rosbag2 or a .bag file"),
     ):
         assert main(["calibrate-stride", "--site", str(site), *words]) == 2
         assert says in capfd.readouterr().err
