@@ -31,6 +31,8 @@ def inside(position_m: Array, area: WalkableArea) -> tuple[Array, Array] | None:
     Position (2,) and covariance (2, 2), of which the part along the gallery says nothing; None where `position_m` (2,)
     is no rock.
     """
+    if area.holds(position_m):
+        return None
     wall_m = area.nearest(position_m[None])[0]
     out_m = position_m - wall_m
     depth_m = float(np.hypot(*out_m))

@@ -40,6 +40,12 @@ def test_a_nearest_point_is_inside_and_nothing_on_the_centre_lines_is_nearer(poi
     assert AREA.outside_m(at)[0] <= np.min(np.hypot(*(line - at).T)) + 1e-9
 
 
+@given(st.tuples(st.floats(-50, 50), st.floats(-50, 50)))
+def test_the_area_holds_a_point_that_is_not_outside(point):
+    outside_m = AREA.outside_m(np.array([point]))[0]
+    assert AREA.holds(np.array(point)) == (outside_m == 0.0) or outside_m < 1e-9
+
+
 def test_legs_know_their_gallery_and_how_far_a_point_is_from_each():
     area = WalkableArea([BEND, Gallery("side", ((0, 10, 0), (10, 10, 0)), width_m=2.0, height_m=3.0)], [ROOM])
     assert area.gallery_of_leg.tolist() == [0, 0, 1]
