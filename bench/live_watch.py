@@ -108,7 +108,7 @@ def _watch(pipe: Connection, *, stages: bool) -> None:
 
 
 def _seen(received: list[tuple[str, int, Any]]) -> Seen:
-    from mine_loc_core.nodes.conversions import to_stamp_ns  # noqa: PLC0415
+    from mine_loc_core.stamps import to_stamp_ns  # noqa: PLC0415
 
     stamps: dict[RoundKey, int] = {}
     arrivals: dict[str, dict[tuple[int, int], int]] = {}

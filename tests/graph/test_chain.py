@@ -32,8 +32,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, MagneticField
 from tf2_msgs.msg import TFMessage
 
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.qos import STREAM
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_uwb.ranging import Range
 
 pytestmark = pytest.mark.graph

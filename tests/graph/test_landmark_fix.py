@@ -15,8 +15,9 @@ from mine_loc_interfaces.srv import SetPose
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.qos import EVENTS
+from mine_loc_core.stamps import to_stamp_ns
 
 pytestmark = pytest.mark.graph
 

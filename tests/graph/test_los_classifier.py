@@ -13,8 +13,8 @@ from graph.processes import Running
 from graph.walker import VISITOR_TAG, frame, ranging
 from mine_loc_interfaces.msg import CirFrame, Epoch, LinkState, LosModelInfo
 
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_uwb.ranging import CirWindow
 from mine_loc_uwb.wire.mine_loc_frame import encode_frame
 from mine_loc_uwb.wire.mine_loc_payload import FrameType, encode_cir

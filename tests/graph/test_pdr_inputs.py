@@ -15,8 +15,9 @@ from sensor_msgs.msg import Imu, MagneticField
 from tf2_msgs.msg import TFMessage
 
 from mine_loc_core import quaternion
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_pdr.mounting import FORWARD_PHASE_RAD
 
 pytestmark = pytest.mark.graph

@@ -21,9 +21,8 @@ from mine_loc_bringup.bags.bag_folder import BagFolder, Storage
 from mine_loc_bringup.bags.message_definitions import MessageDefinitions
 from mine_loc_bringup.bags.topic import BagTopic
 from mine_loc_bringup.nodes.bag_qos import to_bag
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_stamp_ns
 
 pytestmark = pytest.mark.graph
 

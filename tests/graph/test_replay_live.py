@@ -17,8 +17,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool
 
 from mine_loc_bringup.main import main
-from mine_loc_core.nodes.conversions import to_stamp_ns
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import NS_PER_S, to_stamp_ns
 
 pytestmark = pytest.mark.graph
 

@@ -14,8 +14,8 @@ from graph.walker import WALKER_TAG, person, position_m, ranging, write_site
 from mine_loc_interfaces.msg import PersonPose, PersonPoseArray, UwbPose, UwbRange, UwbRangeArray
 from rosgraph_msgs.msg import Clock
 
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_core.nodes.conversions import to_time
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_stamp_ns
 
 pytestmark = pytest.mark.graph
 

@@ -14,7 +14,7 @@ from mine_loc_interfaces.msg import PersonPoseArray
 from mine_loc_bringup.bag_messages import open_bag
 from mine_loc_bringup.message_types import workspace_types
 from mine_loc_bringup.offline_run import replay_offline
-from mine_loc_core.nodes.conversions import to_stamp_ns
+from mine_loc_core.stamps import to_stamp_ns
 
 pytestmark = pytest.mark.graph
 

@@ -44,9 +44,8 @@ class BagMessages:
     def __init__(self, reader: AnyReader, bag: Path, mapping: TopicMapping) -> None:
         self._reader, self._bag, self._mapping = reader, bag, mapping
         self._types = workspace_types()
-        self.count = reader.message_count
-        self.start_ns = reader.start_time if self.count else 0
-        self.end_ns = reader.end_time if self.count else 0
+        held = reader.message_count
+        self.start_ns, self.end_ns = (reader.start_time, reader.end_time) if held else (0, 0)
 
     @property
     def topics(self) -> dict[str, str]:

@@ -9,6 +9,8 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from mine_loc_core.errors import ConfigurationError
+
 _OUR_PACKAGES = ("mine_loc_interfaces", "tf2_msgs")
 
 
@@ -24,9 +26,17 @@ def workspace_types() -> Typestore:
 
 
 def message_class(type_name: str) -> type:
-    """The Python class of a type such as `std_msgs/msg/Header`, of rclpy. Raises ImportError or AttributeError."""
-    package, _, name = type_name.split("/")
-    found: type = getattr(import_module(f"{package}.msg"), name)
+    """The Python class, of rclpy, of a type such as `std_msgs/msg/Header`.
+
+    Raises ConfigurationError where it is not installed.
+    """
+    try:
+        package, _, name = type_name.split("/")
+        found: type = getattr(import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError, ValueError):
+        raise ConfigurationError(
+            f"{type_name}: not installed here; allowed: a type of a package in this workspace"
+        ) from None
     return found
 
 

@@ -18,7 +18,7 @@ from mine_loc_bringup.message_types import workspace_types
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import load_people
 from mine_loc_core.site import Site, load_site
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import NS_PER_S, to_stamp_ns
 from mine_loc_sim.scene import anchor_places_m
 from mine_loc_uwb.range_pairs import RangePairs, joined
 from mine_loc_uwb.stamp_latency import StampLatency, TimedRanges, common_latency_s, fit_stamp_latency
@@ -64,22 +64,18 @@ def _take(topic: str, read: Any, tags: dict[int, _Tag], tag_of: Mapping[str, int
     words = topic.strip("/").split("/")
     if words == ["uwb", "ranges"]:
         message = read()
-        stamp_ns = _ns(message.header.stamp)
+        stamp_ns = to_stamp_ns(message.header.stamp)
         rows = tags[message.tag_id].ranges
         if len(rows) < _MOST_RANGES:
             rows += [(stamp_ns + r.stamp_offset_ns, r.anchor_id, r.range_raw, r.receive_power) for r in message.ranges]
     elif words == ["truth", "link_state"]:
         message = read()
         hidden = message.most_likely_class in _NO_LINE_OF_SIGHT
-        tags[message.tag_id].classes[message.anchor_id].append((_ns(message.header.stamp), hidden))
+        tags[message.tag_id].classes[message.anchor_id].append((to_stamp_ns(message.header.stamp), hidden))
     elif len(words) == 3 and words[0] == "truth" and words[2] == "pose" and words[1] in tag_of:
         message = read()
         place = message.pose.position
-        tags[tag_of[words[1]]].track.append((_ns(message.header.stamp), place.x, place.y, place.z))
-
-
-def _ns(stamp: Any) -> int:
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
+        tags[tag_of[words[1]]].track.append((to_stamp_ns(message.header.stamp), place.x, place.y, place.z))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

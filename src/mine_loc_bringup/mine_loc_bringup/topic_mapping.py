@@ -14,7 +14,6 @@ The file (schema/topic_mapping.schema.json; example in docs/bags.md):
           ranges: {each: measurements, where: valid, fields: {anchor_id: id, range: {from: mm, scale: 0.001}}}
 """
 
-import functools
 import math
 import operator
 from collections.abc import Iterator, Mapping
@@ -113,7 +112,7 @@ def _items(source: Any, rule: Mapping[str, Any]) -> Iterator[Any]:
 
 
 def _at(source: Any, path: str) -> Any:
-    return functools.reduce(lambda value, name: operator.attrgetter(name)(value), path.split("."), source)
+    return operator.attrgetter(path)(source)
 
 
 def _unset(field: str, kind: Any, types: Typestore) -> Any:

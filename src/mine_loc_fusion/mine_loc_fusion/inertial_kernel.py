@@ -15,6 +15,7 @@ import math
 import numpy as np
 from numba import njit
 
+from mine_loc_fusion import step_kernel
 from mine_loc_fusion.estimate import Array
 from mine_loc_fusion.step_kernel import OWN_STATES, YAW
 
@@ -62,12 +63,7 @@ def pass_time(x: Array, P: Array, dimensions: int, gone_s: float, error_sd_m_s2:
 @njit(cache=True)
 def remember_velocity(x: Array, P: Array, dimensions: int) -> None:
     """Let the clone be the velocity now."""
-    clone = 2 * dimensions + 1 + VELOCITY
-    for axis in range(dimensions):
-        x[clone + axis] = x[dimensions + axis]
-        P[clone + axis, :] = P[dimensions + axis, :]
-    for axis in range(dimensions):
-        P[:, clone + axis] = P[:, dimensions + axis]
+    step_kernel.clone(x, P, dimensions, 2 * dimensions + 1 + VELOCITY, dimensions)
 
 
 @njit(cache=True)
@@ -89,7 +85,7 @@ def take_velocity_change(
     beyond `gate` nothing changes.
     """
     d, own = dimensions, 2 * dimensions + 1
-    yaw, clone, slope = first_link - OWN_STATES + YAW, own + VELOCITY, own + VELOCITY + d
+    yaw, before, slope = first_link - OWN_STATES + YAW, own + VELOCITY, own + VELOCITY + d
     new_x, new_P, H, distance_sq = x.copy(), P.copy(), np.zeros(len(x)), 0.0
     for axis in range(d):
         c, s = (
@@ -103,8 +99,8 @@ def take_velocity_change(
                 H[yaw] = across
             else:
                 H[own + COSINE], H[own + SINE] = -east, north
-        H[d + axis], H[clone + axis], H[slope + axis] = 1.0, -1.0, -interval_s
-        error = along + new_x[slope + axis] * interval_s - new_x[d + axis] + new_x[clone + axis]
+        H[d + axis], H[before + axis], H[slope + axis] = 1.0, -1.0, -interval_s
+        error = along + new_x[slope + axis] * interval_s - new_x[d + axis] + new_x[before + axis]
         gain = new_P @ H
         variance = float(H @ gain) + variance_m2_s2
         distance_sq += error * error / variance

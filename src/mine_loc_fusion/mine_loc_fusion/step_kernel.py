@@ -26,14 +26,19 @@ def drift(P: Array, first_link: int, yaw_variance_rad2: float, scale_variance: f
 
 
 @njit(cache=True)
+def clone(x: Array, P: Array, first: int, copy: int, count: int) -> None:
+    """Let `count` states from `copy` on be those from `first` on as they are now (stochastic cloning)."""
+    for axis in range(count):
+        x[copy + axis] = x[first + axis]
+        P[copy + axis, :] = P[first + axis, :]
+    for axis in range(count):
+        P[:, copy + axis] = P[:, first + axis]
+
+
+@njit(cache=True)
 def remember_strike(x: Array, P: Array, first_link: int) -> None:
     """Let the clone be the position now."""
-    strike = first_link - OWN_STATES + STRIKE_X
-    for axis in range(2):
-        x[strike + axis] = x[axis]
-        P[strike + axis, :] = P[axis, :]
-    for axis in range(2):
-        P[:, strike + axis] = P[:, axis]
+    clone(x, P, 0, first_link - OWN_STATES + STRIKE_X, 2)
 
 
 @njit(cache=True)

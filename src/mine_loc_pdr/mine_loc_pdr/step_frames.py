@@ -1,7 +1,6 @@
 """Motion of the waist as frames: means over a fixed grid of 20 ms, whatever rate and jitter the samples come with.
 
-A frame has six channels: acceleration upwards and in two level directions that turn with the waist (m/s²), the turn
-rate about the vertical and about the same two directions (rad/s).
+A frame has the six channels of `Motion`.
 """
 
 import numpy as np
@@ -9,6 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mine_loc_core.stamps import NS_PER_MS
+from mine_loc_pdr.steps import Motion
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class FrameStream:
         self._state[:] = 0.0
         self._last_ns = -1
 
-    def push(self, stamp_ns: int, motion: tuple[float, float, float, float, float, float]) -> Array:
+    def push(self, stamp_ns: int, motion: Motion) -> Array:
         """Take one sample; the frames (n, CHANNELS) it completes, which end at the last multiples of FRAME_NS by then.
 
         The array is valid up to the next call.
@@ -45,9 +45,7 @@ class FrameStream:
 
 
 @njit(cache=True)
-def _integrate(
-    state: Array, frames: Array, last_ns: int, stamp_ns: int, motion: tuple[float, float, float, float, float, float]
-) -> int:
+def _integrate(state: Array, frames: Array, last_ns: int, stamp_ns: int, motion: Motion) -> int:
     """Write the frames that end in (last_ns, stamp_ns]; how many."""
     up = motion[0]
     if last_ns < 0:

@@ -5,7 +5,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.type_hash import TypeHash
 
 from mine_loc_bringup.bags.message_definitions import MessageDefinitions
-from mine_loc_bringup.nodes.installed_types import installed_class
+from mine_loc_bringup.message_types import message_class
 from mine_loc_bringup.nodes.recorder import check_version
 from mine_loc_core.errors import ConfigurationError
 
@@ -34,4 +34,4 @@ def test_what_is_not_installed_is_refused_by_name(msgtype):
     with pytest.raises(ConfigurationError, match=f"{msgtype}: its definition is not installed"):
         MessageDefinitions().find(msgtype)
     with pytest.raises(ConfigurationError, match=f"{msgtype}: not installed here"):
-        installed_class(msgtype)
+        message_class(msgtype)

@@ -5,7 +5,8 @@ from builtin_interfaces.msg import Time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time
+from mine_loc_core.stamps import to_stamp_ns
 
 
 @given(st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))

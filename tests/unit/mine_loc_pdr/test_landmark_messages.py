@@ -8,8 +8,8 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from mine_loc_interfaces.msg import LandmarkFix as Message
 
 from mine_loc_core.errors import MineLocError
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.site import TurnMarker
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_pdr.nodes.landmark_messages import UNKNOWN_SD_M, UNKNOWN_YAW_SD_RAD, to_landmark_fix, to_map_pose
 from mine_loc_pdr.pseudo_plane import MARKER_SD_M, LandmarkFix, Verdict
 from mine_loc_pdr.turns import Turn

@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from mine_loc_core.nodes.conversions import to_stamp_ns
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_stamp_ns
 from mine_loc_uwb.device_stamps import DeviceStamps
 from mine_loc_uwb.nodes.line_messages import LineIds, stamped_message
 from mine_loc_uwb.ranging import CirWindow, Range, RangingRound

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mine_loc_interfaces.msg import TdoaArray, TdoaDifference, UwbPose, UwbRange, UwbRangeArray
 
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_uwb.fix import Fix, FixStatus, no_fix
 from mine_loc_uwb.nodes.solver_messages import measured_arrivals, measured_ranges, to_pose
 from mine_loc_uwb.range_intake import MeasuredRange

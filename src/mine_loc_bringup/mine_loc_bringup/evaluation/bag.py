@@ -15,7 +15,7 @@ from mine_loc_bringup.bag_messages import BagMessages, open_bag
 from mine_loc_bringup.evaluation.track import Array, Integers, StepCount, Track, Truth
 from mine_loc_bringup.message_types import workspace_types
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
+from mine_loc_core.stamps import NS_PER_MS, to_stamp_ns
 from mine_loc_core.verdicts import Reason, Source
 
 POSES = "/fused/poses"
@@ -96,7 +96,7 @@ def read_outputs(bag: Path, progress: Progress | None = None) -> Outputs:
                 _take_counters(read(), outputs.counters)
             elif topic in steps:
                 message = read()
-                steps[topic].setdefault(message.person, []).append(_ns(message.header.stamp))
+                steps[topic].setdefault(message.person, []).append(to_stamp_ns(message.header.stamp))
     outputs.tracks = {name: each.track() for name, each in sorted(columns.items())}
     outputs.found_steps, outputs.true_steps = (
         {name: np.unique(np.array(stamps, np.int64)) for name, stamps in found.items()} for found in steps.values()
@@ -118,7 +118,7 @@ def read_truth(bag: Path, pattern: str, people: list[str], progress: Progress | 
         person_of = _people_of(pattern, sorted(messages.topics), people)
         for topic, _, read in _messages(messages, set(person_of), progress):
             message = read()
-            stamp_ns, place = _ns(message.header.stamp), _place(message, f"{bag}: {topic}")
+            stamp_ns, place = to_stamp_ns(message.header.stamp), _place(message, f"{bag}: {topic}")
             rows.setdefault(person_of[topic], []).append((stamp_ns, float(place.x), float(place.y)))
             frames.setdefault(person_of[topic], str(message.header.frame_id))
     return {name: _truth(found, frames[name]) for name, found in sorted(rows.items())}
@@ -174,7 +174,7 @@ def _take_poses(message: Any, logged_ns: int, columns: dict[str, _Columns], outp
     outputs.frame = outputs.frame or str(message.header.frame_id)
     for person in message.people:
         own = columns.setdefault(person.person, _Columns())
-        own.integers.extend((_ns(person.stamp), logged_ns, person.mode))
+        own.integers.extend((to_stamp_ns(person.stamp), logged_ns, person.mode))
         place, covariance = person.pose.pose.position, person.pose.covariance
         own.numbers.extend((place.x, place.y, covariance[0], covariance[1], covariance[7], person.horizontal_ce95))
 
@@ -195,10 +195,6 @@ def _take_counters(message: Any, counters: dict[str, dict[str, float]]) -> None:
 
 def _name(kind: type[Source] | type[Reason], number: int) -> str:
     return kind(number).name if number in kind.__members__.values() else "UNKNOWN"
-
-
-def _ns(stamp: Any) -> int:
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
 def _messages(

@@ -19,8 +19,8 @@ from sensor_msgs.msg import Imu, MagneticField
 from tf2_msgs.msg import TFMessage
 
 from mine_loc_bringup.bag_writer import BagWriter
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
+from mine_loc_core.stamps import to_stamp_ns
 
 _RATE_WINDOW_S = 3.0
 

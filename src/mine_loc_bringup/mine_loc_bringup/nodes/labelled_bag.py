@@ -10,7 +10,7 @@ from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader, ReaderError
 
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.nodes.conversions import to_stamp_ns
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_uwb.cir_frames import concatenate
 from mine_loc_uwb.labelled_frames import LabelledFrames
 from mine_loc_uwb.nodes.cir_messages import tap_count, to_cir_frames

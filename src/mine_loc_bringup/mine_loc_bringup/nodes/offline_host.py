@@ -225,6 +225,10 @@ class OfflineHost:
         elif isinstance(entity, _Timer):
             entity.running = False
 
+    def info(self, text: str) -> None:
+        """To stderr."""
+        self.warn(text)
+
     def warn(self, text: str) -> None:
         """To stderr."""
         print(f"[{self.node_name}] {text}", file=sys.stderr)

@@ -20,8 +20,8 @@ from mine_loc_bringup.bags.graph_topics import played_by_default
 from mine_loc_bringup.bags.message_definitions import MessageDefinitions, type_hash
 from mine_loc_bringup.bags.patterns import TopicPatterns, split_list, unmatched
 from mine_loc_bringup.bags.timeline import Timeline
+from mine_loc_bringup.message_types import message_class
 from mine_loc_bringup.nodes.bag_qos import to_publish
-from mine_loc_bringup.nodes.installed_types import installed_class
 from mine_loc_bringup.parameters import PlayerParameters
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
@@ -47,7 +47,6 @@ class Player(NodeBase):
 
     def __init__(self, host: RosHost) -> None:
         super().__init__(host)
-        self._log = host.get_logger()
         self.problem = ""
         """Why the bag could not be played to its end."""
 
@@ -86,7 +85,7 @@ class Player(NodeBase):
         self._stopping.set()
         if self._thread is not threading.current_thread():
             self._thread.join()
-        self._log.info(f"{self._bag.path}: {self._played} messages played, {self._loops} time(s) to the end")
+        self.host.info(f"{self._bag.path}: {self._played} messages played, {self._loops} time(s) to the end")
 
     def parameters_changed(self) -> None:
         """Another rate."""
@@ -102,7 +101,7 @@ class Player(NodeBase):
         """Let the clock stand still, or go on."""
         with self._lock:
             self._timeline.pause(time.monotonic_ns(), paused=paused)
-        self._log.info("paused" if paused else "playing")
+        self.host.info("paused" if paused else "playing")
 
     def toggle_pause(self) -> None:
         """Pause, or go on."""
@@ -134,7 +133,7 @@ class Player(NodeBase):
                 if offered.setdefault(topic, msgtype) != msgtype:
                     raise ConfigurationError(f"{msgtype}: its second type; allowed: {offered[topic]}")  # noqa: TRY301
             except ConfigurationError as error:
-                self._log.warning(f"{topic}: not played: {error}")
+                self.host.warn(f"{topic}: not played: {error}")
                 continue
             played.append(connection)
             if topic not in self._outputs:
@@ -157,7 +156,7 @@ class Player(NodeBase):
                     break
         except Exception as error:  # noqa: BLE001 the thread must say why it ends
             self.problem = f"{self._bag.path}: {error}"
-            self._log.error(self.problem)
+            self.host.error(self.problem)
         if not self._stopping.is_set():
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -231,19 +230,13 @@ def _class_of(connection: Connection, definitions: MessageDefinitions) -> Any:
         raise ConfigurationError(
             f"{connection.msgtype}: another version is installed here; allowed: the one of the bag"
         )
-    return installed_class(connection.msgtype)
+    return message_class(connection.msgtype)
 
 
 def play(words: list[str], made: list[Player]) -> int:
     """Run a player, put into `made`, with these ROS arguments; exit status 1 where the bag could not be played."""
     sys.argv[1:] = words
-
-    class _Kept(Player):
-        def __init__(self, host: RosHost) -> None:
-            super().__init__(host)
-            made.append(self)
-
-    status = run(_Kept)
+    status = run(Player, made.append)
     return 1 if made and made[0].problem else status
 
 

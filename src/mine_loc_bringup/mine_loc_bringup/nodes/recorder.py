@@ -15,8 +15,8 @@ from mine_loc_bringup.bags.message_definitions import MessageDefinitions
 from mine_loc_bringup.bags.patterns import TopicPatterns, split_list, unmatched
 from mine_loc_bringup.bags.recording import Recording, RecordingStatus
 from mine_loc_bringup.bags.topic import BagTopic
+from mine_loc_bringup.message_types import message_class
 from mine_loc_bringup.nodes.bag_qos import STATIC_TRANSFORMS, latched_depth, to_bag, to_subscribe
-from mine_loc_bringup.nodes.installed_types import installed_class
 from mine_loc_bringup.parameters import RecorderParameters
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
@@ -49,7 +49,6 @@ class Recorder(NodeBase):
 
     def __init__(self, host: RosHost) -> None:
         super().__init__(host)
-        self._log = host.get_logger()
         self.status: RecordingStatus | None = None
         """How the last recording ended."""
 
@@ -77,7 +76,7 @@ class Recorder(NodeBase):
         bag = BagFolder(self.path, Storage(parameters.storage), limits)
         self._recording = Recording(bag, round(parameters.queue_mb * _BYTES_A_MB))
         self._told = ""
-        self._log.info(f"recording to {self.path}")
+        self.host.info(f"recording to {self.path}")
 
     def deactivate(self) -> None:
         """End the bag, and forget the topics: the next one declares them anew."""
@@ -89,11 +88,11 @@ class Recorder(NodeBase):
             f"{status.messages} messages of {status.topics} topics in {status.parts} part(s), {status.dropped} dropped"
         )
         if status.problem:
-            self._log.error(
+            self.host.error(
                 f"{status.problem}; the bag has no end: mine-loc bag repair {self.path} OUT opens it; {held} at most"
             )
         else:
-            self._log.info(f"{self.path}: {held}")
+            self.host.info(f"{self.path}: {held}")
 
     def clock_jumped(self, delta_ns: int) -> None:
         """Times of a part rise: one that would go back is followed by another."""
@@ -143,7 +142,7 @@ class Recorder(NodeBase):
             return
         try:
             definition, type_hash = self._definitions.find(msgtype)
-            kind = installed_class(msgtype)
+            kind = message_class(msgtype)
             check_version(msgtype, type_hash, publishers)
         except ConfigurationError as error:
             self._refuse(name, f"{name}: not recorded: {error}")
@@ -172,15 +171,15 @@ class Recorder(NodeBase):
         """Say once when the disk takes no more, and when it does again."""
         status = self._recording.status
         if status.problem and not self._told:
-            self._log.error(f"{status.problem}; what was written is safe, and recording goes on when there is room")
+            self.host.error(f"{status.problem}; what was written is safe, and recording goes on when there is room")
         elif self._told and not status.problem:
-            self._log.info(f"recording goes on; {status.dropped} messages were dropped so far")
+            self.host.info(f"recording goes on; {status.dropped} messages were dropped so far")
         self._told = status.problem
 
     def _refuse(self, key: str, reason: str) -> None:
         if key not in self._refused:
             self._refused[key] = reason
-            self._log.warning(reason)
+            self.host.warn(reason)
 
     def _tell_waiting(self) -> None:
         self._waiting.cancel()
@@ -190,7 +189,7 @@ class Recorder(NodeBase):
         """Name the patterns of a single topic that no topic matched."""
         single = [pattern for pattern in split_list(self.parameters.topics) if "*" not in pattern]
         for pattern in unmatched(single, {*self._heard, *self._refused}):
-            self._log.warning(f"{pattern}: nobody publishes a topic of this name")
+            self.host.warn(f"{pattern}: nobody publishes a topic of this name")
 
 
 def check_version(msgtype: str, type_hash: str, publishers: Iterable[TopicEndpointInfo]) -> None:
@@ -204,13 +203,7 @@ def record(words: list[str]) -> int:
     """Run a recorder with these ROS arguments until SIGINT; exit status 1 where not all reached the disk."""
     sys.argv[1:] = words
     made: list[Recorder] = []
-
-    class _Kept(Recorder):
-        def __init__(self, host: RosHost) -> None:
-            super().__init__(host)
-            made.append(self)
-
-    status = run(_Kept)
+    status = run(Recorder, made.append)
     ended = made[0].status if made else None
     return 1 if ended and (ended.problem or ended.dropped) else status
 

@@ -18,12 +18,11 @@ from mine_loc_bringup.store.parameters import StoreParameters
 from mine_loc_bringup.store.retention import RetentionRule, check_rule, retain
 from mine_loc_bringup.store.spool import Spool
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import NS_PER_S, to_stamp_ns
 
 _BATCH_ROWS = 5000
 _RETAIN_NS = 60 * NS_PER_S

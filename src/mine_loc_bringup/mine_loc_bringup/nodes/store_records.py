@@ -5,7 +5,8 @@ import math
 from mine_loc_interfaces import msg
 
 from mine_loc_bringup.store.records import Alarm, Pose, RangeRound, Region, finite
-from mine_loc_core.nodes.conversions import to_stamp_ns
+from mine_loc_core.nodes.conversions import to_yaw_rad
+from mine_loc_core.stamps import to_stamp_ns
 
 
 def to_poses(array: msg.PersonPoseArray) -> list[Pose]:
@@ -14,8 +15,8 @@ def to_poses(array: msg.PersonPoseArray) -> list[Pose]:
 
 
 def _to_pose(person: msg.PersonPose) -> Pose:
-    pose, covariance, turn = person.pose.pose, person.pose.covariance, person.pose.pose.orientation
-    yaw_rad = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
+    pose, covariance = person.pose.pose, person.pose.covariance
+    yaw_rad = to_yaw_rad(pose.orientation)
     numbers = (pose.position.x, pose.position.y, pose.position.z, yaw_rad, covariance[0], covariance[1], covariance[7])
     return Pose(
         _text(person.person),

@@ -9,7 +9,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 
 from mine_loc_bringup.recordings.public_data import refused, required
 from mine_loc_bringup.recordings.recording import NO_FIELD, Instant, Recording, TrueTrack, Vector3, site_content
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_pdr.fdilink import Quaternion
 from mine_loc_pdr.n100_stream import ImuMeasurement
 from mine_loc_uwb.ranging import Range, RangingRound
@@ -51,7 +51,7 @@ def read_walk(path: Path) -> Walk:
                 raise refused(path, f"no topic {missing[0]}", _EXPECTED)
             for connection, arrival_ns, raw in reader.messages(wanted):
                 message: Any = reader.deserialize(raw, connection.msgtype)
-                stamp_ns = message.header.stamp.sec * NS_PER_S + message.header.stamp.nanosec
+                stamp_ns = to_stamp_ns(message.header.stamp)
                 take[connection.topic](walk, Instant(stamp_ns, max(stamp_ns, arrival_ns)), message)
     except (AnyReaderError, OSError, ValueError, KeyError) as error:
         raise refused(path, f"cannot be read as a bag ({error})", _EXPECTED) from None

@@ -14,7 +14,6 @@ from mine_loc_bringup.store.database import migrate, reason
 from mine_loc_bringup.store.keeper import DatabaseUnavailableError
 from mine_loc_bringup.store.records import Record
 
-_THINNED = {"poses", "regions", "range_rounds"}
 _REFUSALS = (DataError, IntegrityError, OverflowError)
 _Inserting = Callable[[Connection, Table, list[dict[str, Any]]], None]
 
@@ -70,6 +69,7 @@ class DatabaseWriter:
 
     def _values(self, connection: Connection, name: str, records: Sequence[Record]) -> list[dict[str, Any]]:
         rows = [record._asdict() for record in records]
+        thinned = "span_s" in tables.METADATA.tables[name].c
         self._number(connection, tables.people, {row["person"] for row in rows if row.get("person")})
         if name == "poses":
             self._number_places(connection, {row["areas"] for row in rows})
@@ -82,7 +82,7 @@ class DatabaseWriter:
                 row["place_id"] = self._ids[tables.places, " ".join(row.pop("areas"))]
             if "area" in row:
                 row["area_id"] = self._ids[tables.areas, row.pop("area")]
-            if name in _THINNED:
+            if thinned:
                 row["span_s"] = 0
         return rows
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, Row, func, select
 
 from mine_loc_bringup.store import tables
+from mine_loc_bringup.store.records import NOWHERE
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.stamps import NS_PER_S, to_ns, to_s
 from mine_loc_fusion.mode import Mode
@@ -13,9 +14,8 @@ from mine_loc_fusion.mode import Mode
 LOOK_BACK_NS = 86_400 * NS_PER_S
 """Whoever was not heard of for a day is not reported as lost any more."""
 
-_NOWHERE = (int(Mode.UNKNOWN), int(Mode.INITIALISING), int(Mode.LOST))
 _poses, _people, _places = tables.poses, tables.people, tables.places
-_placed = _poses.c.mode.not_in(_NOWHERE)
+_placed = _poses.c.mode.not_in(NOWHERE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ def _fix(connection: Connection, person: Row[tuple[int, str]], at_ns: int, max_a
     row = connection.execute(latest).one_or_none()
     if row is None:
         return None
-    nowhere = row.mode in _NOWHERE
+    nowhere = row.mode in NOWHERE
     known = connection.execute(latest.where(_placed)).one_or_none() if nowhere else row
     shown = known or row
     age_s = to_s(at_ns - shown.stamp_ns)
@@ -90,7 +90,7 @@ class TrackPoint:
     @property
     def placed(self) -> bool:
         """Whether it says where the person was."""
-        return self.mode not in _NOWHERE
+        return self.mode not in NOWHERE
 
 
 def track(connection: Connection, person: str, from_ns: int, to_ns_: int) -> Iterator[TrackPoint]:

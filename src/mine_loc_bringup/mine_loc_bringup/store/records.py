@@ -9,6 +9,9 @@ from typing import NamedTuple
 
 from mine_loc_fusion.mode import Mode
 
+NOWHERE = frozenset(map(int, (Mode.UNKNOWN, Mode.INITIALISING, Mode.LOST)))
+"""Modes that do not say where the person is."""
+
 
 class Pose(NamedTuple):
     """A fused pose. `areas`: ids of the zones, galleries and chambers it lies in, filled in by the store."""
@@ -32,8 +35,7 @@ class Pose(NamedTuple):
     @property
     def placed(self) -> bool:
         """Whether it says where the person is."""
-        known = self.mode not in {Mode.UNKNOWN, Mode.INITIALISING, Mode.LOST}
-        return known and self.x_m is not None and self.y_m is not None
+        return self.mode not in NOWHERE and self.x_m is not None and self.y_m is not None
 
 
 class ZoneEvent(NamedTuple):

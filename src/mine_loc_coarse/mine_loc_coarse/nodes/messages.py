@@ -6,7 +6,8 @@ from mine_loc_interfaces.msg import Bearing, BearingArray, CoarseRegion
 
 from mine_loc_coarse.bearing_report import BearingReport
 from mine_loc_coarse.situation import Region
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time
+from mine_loc_core.stamps import to_stamp_ns
 
 _LAST_UINT32 = 2**32 - 1
 _MOST_NEIGHBOURS = 256

@@ -61,6 +61,9 @@ class Host(Protocol):
     def discard(self, entity: Any) -> None:
         """Destroy what one of the methods above made."""
 
+    def info(self, text: str) -> None:
+        """Into the log."""
+
     def warn(self, text: str) -> None:
         """Into the log."""
 

@@ -115,6 +115,10 @@ class RosHost(LifecycleNode):
         }
         destroy[type(entity)](entity)
 
+    def info(self, text: str) -> None:
+        """Into the log."""
+        self.get_logger().info(text)
+
     def warn(self, text: str) -> None:
         """Into the log."""
         self.get_logger().warning(text)
@@ -236,8 +240,10 @@ def _descriptor(constraint: Constraint, default: Any) -> ParameterDescriptor:
     return descriptor
 
 
-def run(node_class: type[NodeBase]) -> int:
+def run(node_class: type[NodeBase], on_made: Callable[[Any], None] = lambda _: None) -> int:
     """Run a node until SIGINT or SIGTERM. Exit status 2 when its configuration is impossible.
+
+    `on_made` gets the node before it starts, for a caller who asks it something afterwards.
 
     Without a lifecycle manager the node configures and activates itself (parameter `autostart`).
     """
@@ -248,6 +254,7 @@ def run(node_class: type[NodeBase]) -> int:
     host = None
     try:
         host = RosHost(node_class)
+        on_made(host.node)
         if host.node.parameters.autostart and not host.start():
             return 2  # the transition has logged why
         executor = EventsExecutor()

@@ -13,14 +13,14 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns
+from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_ns, to_stamp_ns
 from mine_loc_core.verdicts import Source
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import Estimate, is_position

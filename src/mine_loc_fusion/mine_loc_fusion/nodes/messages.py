@@ -6,7 +6,8 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped, Vector3
 from mine_loc_interfaces import msg
 
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_core.verdicts import Reason, Source, Verdict
 from mine_loc_fusion.estimate import (
     Array,

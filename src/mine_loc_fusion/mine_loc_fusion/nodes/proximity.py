@@ -11,12 +11,13 @@ from mine_loc_interfaces import msg
 from mine_loc_interfaces.srv import Reset
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_fusion.nodes.proximity_messages import to_alarm_array, to_guard_rules, to_pose2, to_seen
 from mine_loc_fusion.proximity_guard import ProximityGuard
 from mine_loc_fusion.proximity_parameters import ProximityParameters

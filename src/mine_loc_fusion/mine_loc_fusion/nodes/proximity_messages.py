@@ -8,7 +8,8 @@ from geometry_msgs.msg import Pose
 from mine_loc_interfaces import msg
 
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time, to_yaw_rad
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_fusion.mode import Mode
 from mine_loc_fusion.possible_presence import DoubtRule, SeenPerson
 from mine_loc_fusion.presence import PresenceRule
@@ -31,8 +32,7 @@ def to_pose2(pose: Pose) -> Pose2:
     norm = math.sqrt(q.w**2 + q.x**2 + q.y**2 + q.z**2)
     if not 0.9 < norm < 1.1:
         return Pose2(pose.position.x, pose.position.y, math.nan)
-    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y**2 + q.z**2))
-    return Pose2(pose.position.x, pose.position.y, yaw)
+    return Pose2(pose.position.x, pose.position.y, to_yaw_rad(q))
 
 
 def to_guard_rules(p: ProximityParameters) -> GuardRules:

@@ -9,11 +9,11 @@ from mine_loc_interfaces.msg import ProximityStop
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns
 from mine_loc_core.nodes.node_base import Host, NodeBase
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.site import Relay, load_site
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_fusion.proximity_parameters import RelayParameters
 from mine_loc_fusion.relay_driver import RelayDriver
 from mine_loc_fusion.relay_outputs import make_output

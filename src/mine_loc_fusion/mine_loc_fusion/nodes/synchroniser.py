@@ -9,13 +9,13 @@ from typing import Any
 from mine_loc_interfaces import msg
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_MS, to_ns
+from mine_loc_core.stamps import NS_PER_MS, to_ns, to_stamp_ns
 from mine_loc_fusion.parameters import SynchroniserParameters
 from mine_loc_fusion.synchroniser import Epoch, Kind, Synchroniser, SyncInput
 

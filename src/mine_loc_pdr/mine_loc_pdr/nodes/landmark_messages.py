@@ -8,7 +8,8 @@ from mine_loc_interfaces.msg import LandmarkFix as LandmarkFixMessage
 from std_msgs.msg import Header
 
 from mine_loc_core.errors import MineLocError
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time, to_yaw_rad
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_pdr.map_track import MapPose
 from mine_loc_pdr.pseudo_plane import MARKER_SD_M, LandmarkFix
 
@@ -53,5 +54,4 @@ def to_map_pose(message: PoseWithCovarianceStamped, map_frame: str) -> MapPose:
     covariance = 0.5 * (covariance + covariance.T) + np.diag(known)
     if np.linalg.eigvalsh(covariance)[0] < 0.0:
         raise MineLocError("pose.covariance: allowed: a positive semi-definite one")
-    yaw_rad = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
-    return MapPose(to_stamp_ns(message.header.stamp), place.x, place.y, yaw_rad, covariance)
+    return MapPose(to_stamp_ns(message.header.stamp), place.x, place.y, to_yaw_rad(q), covariance)

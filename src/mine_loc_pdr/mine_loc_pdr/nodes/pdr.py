@@ -19,13 +19,13 @@ from tf2_msgs.msg import TFMessage
 
 from mine_loc_core import quaternion
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED, STREAM
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.people import N100, PeopleFile, Person
 from mine_loc_core.site import Site, load_site
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import NS_PER_S, to_stamp_ns
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_pdr.activity import Activity, ActivityModel, ActivityRecogniser
 from mine_loc_pdr.activity_model_file import load_model, shipped_model

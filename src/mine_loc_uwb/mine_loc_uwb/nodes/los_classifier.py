@@ -12,10 +12,11 @@ from typing import NoReturn
 from mine_loc_interfaces.msg import CirFrame, LinkState, LosModelInfo
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_time
 from mine_loc_core.nodes.node_base import Host, NodeBase, Worker
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.nodes.ros_host import run
+from mine_loc_core.stamps import to_stamp_ns
 from mine_loc_uwb.cir_input import Refusal
 from mine_loc_uwb.link_judgement import Classifier, LinkJudge, load_classifier
 from mine_loc_uwb.nodes.cir_messages import tap_count, to_cir_frames, to_link_state

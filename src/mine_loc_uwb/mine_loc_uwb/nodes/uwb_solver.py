@@ -17,14 +17,14 @@ from mine_loc_interfaces.msg import (
 from mine_loc_interfaces.srv import SetAnchorEnabled
 
 from mine_loc_core.health import Health, Level
-from mine_loc_core.nodes.conversions import to_point, to_stamp_ns, to_time
+from mine_loc_core.nodes.conversions import to_point, to_time
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.nodes.ros_host import run
 from mine_loc_core.nodes.verdict_messages import to_verdict_array
 from mine_loc_core.people import PeopleFile
 from mine_loc_core.site import load_site
-from mine_loc_core.stamps import NS_PER_S
+from mine_loc_core.stamps import NS_PER_S, to_stamp_ns
 from mine_loc_core.verdicts import Verdict
 from mine_loc_uwb.anchor_frame import anchor_frame
 from mine_loc_uwb.fix import Fix, FixStatus
