@@ -106,9 +106,10 @@ class Synchroniser:
         self.late = 0
 
     @property
-    def waiting(self) -> bool:
-        """Whether an epoch is open."""
-        return bool(self._waiting)
+    def next_deadline_ns(self) -> int | None:
+        """When the next open epoch has waited long enough; None while none is open."""
+        open_epochs = (epoch for name in self._waiting for epoch in self._people[name].open.values())
+        return min((epoch.deadline_ns for epoch in open_epochs), default=None)
 
     def push(self, item: SyncInput, now_ns: int) -> tuple[list[Epoch], Reason]:
         """Take an input; the epochs that are complete now, and whether the input was taken (ACCEPTED) or why not."""

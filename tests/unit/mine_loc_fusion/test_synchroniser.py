@@ -39,14 +39,17 @@ def test_a_round_goes_out_as_soon_as_its_position_is_there():
     assert subject.push(item(Kind.RANGES, 0), at(3)) == ([], Reason.ACCEPTED)
     epochs, _ = subject.push(item(Kind.UWB_POSE, 0), at(4))
     assert [(e.stamp_ns, e.late, set(e.inputs)) for e in epochs] == [(T0, False, {Kind.RANGES, Kind.UWB_POSE})]
-    assert not subject.waiting
+    assert subject.next_deadline_ns is None
 
 
 def test_a_round_without_companions_goes_out_when_the_wait_is_over():
     subject = synchroniser()
     subject.push(item(Kind.RANGES, 0), at(3))
+    subject.push(item(Kind.RANGES, 1, person="bob"), at(5))
+    assert subject.next_deadline_ns == at(11)
     assert subject.poll(at(11) - 1) == []
-    assert [set(e.inputs) for e in subject.poll(at(11))] == [{Kind.RANGES}]
+    assert [(e.person, set(e.inputs)) for e in subject.poll(at(11))] == [("ann", {Kind.RANGES})]
+    assert subject.next_deadline_ns == at(13)
 
 
 def test_link_states_are_waited_for_while_they_are_known_to_come_and_no_longer():
@@ -70,7 +73,7 @@ def test_a_round_whose_links_are_judged_does_not_wait_for_its_position():
     subject.push(item(Kind.UWB_POSE, 100, seq=1), at(104))
     (late,) = subject.poll(at(112))
     assert (late.late, set(late.inputs)) == (True, {Kind.UWB_POSE})
-    assert not subject.waiting
+    assert subject.next_deadline_ns is None
 
 
 def test_a_change_of_velocity_does_not_take_a_round_along_that_waits_for_its_links():
@@ -89,13 +92,13 @@ def test_those_who_wait_are_polled_until_their_time_is_over_and_forgotten_with_a
     for person in ("ann", "bob"):
         subject.push(item(Kind.RANGES, 0, person=person), at(0))
     assert [epoch.person for epoch in subject.poll(at(8))] == ["ann", "bob"]
-    assert not subject.waiting
+    assert subject.next_deadline_ns is None
     subject.push(item(Kind.RANGES, 100, seq=1, person="ann"), at(100))
     subject.push(item(Kind.RANGES, 100, seq=1, person="bob"), at(100))
     subject.forget("ann")
-    assert subject.waiting
+    assert subject.next_deadline_ns == at(108)
     subject.reset()
-    assert not subject.waiting
+    assert subject.next_deadline_ns is None
     assert subject.poll(at(200)) == []
 
 
@@ -226,7 +229,7 @@ def test_every_input_is_used_once_or_refused_and_epochs_that_are_not_late_go_for
     for _, epoch in out:
         assert epoch.late == (epoch.stamp_ns <= newest)
         newest = max(newest, epoch.stamp_ns)
-    assert not subject.waiting
+    assert subject.next_deadline_ns is None
 
     out_at = {payload: now_ns for now_ns, epoch in out for payloads in epoch.inputs.values() for payload in payloads}
     assert all(out_at[a.input.payload] - a.now_ns <= WAIT_NS + NS_PER_MS for a in accepted)

@@ -134,6 +134,26 @@ class _Timer:
             self._next()
 
 
+class _Alarm:
+    def __init__(self, time: VirtualTime, callback: Callback) -> None:
+        self._time, self._callback = time, callback
+        self._due_ns: int | None = None
+
+    def ring_at(self, ros_ns: int) -> None:
+        due_ns = self._time.steady_ns + max(ros_ns - self._time.ros_ns, 0)
+        if self._due_ns is None or due_ns < self._due_ns:
+            self._due_ns = due_ns
+            self._time.at(due_ns, lambda: self._ring(due_ns))
+
+    def cancel(self) -> None:
+        self._due_ns = None
+
+    def _ring(self, due_ns: int) -> None:
+        if due_ns == self._due_ns:
+            self._due_ns = None
+            self._callback()
+
+
 class _Worker:
     """Works as late after it was woken as the live graph's thread does, and takes no time."""
 
@@ -209,6 +229,10 @@ class OfflineHost:
         """A timer of virtual time."""
         return _Timer(self._graph.time, to_ns(period_s), callback)
 
+    def make_alarm(self, callback: Callback) -> _Alarm:
+        """An alarm of the bag's time."""
+        return _Alarm(self._graph.time, callback)
+
     def make_service(self, kind: type, name: str, callback: Callable[[Any, Any], Any]) -> object:  # noqa: ARG002
         """Nobody calls a service in a replay."""
         return object()
@@ -219,11 +243,13 @@ class OfflineHost:
         return _Worker(self._graph.time, work)
 
     def discard(self, entity: Any) -> None:
-        """End a subscription or timer."""
+        """End a subscription, timer or alarm."""
         if isinstance(entity, _Subscription):
             self._graph.subscriptions[entity.topic].remove(entity)
         elif isinstance(entity, _Timer):
             entity.running = False
+        elif isinstance(entity, _Alarm):
+            entity.cancel()
 
     def info(self, text: str) -> None:
         """To stderr."""

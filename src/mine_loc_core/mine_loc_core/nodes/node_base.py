@@ -27,6 +27,16 @@ class Worker(Protocol):
         """There will be no more."""
 
 
+class Alarm(Protocol):
+    """Rings once, at a ROS time."""
+
+    def ring_at(self, ros_ns: int) -> None:
+        """Ring then, or earlier where it is set earlier already."""
+
+    def cancel(self) -> None:
+        """Do not ring."""
+
+
 class Host(Protocol):
     """What a node runs in. Entities that it makes are given back to `discard`."""
 
@@ -51,6 +61,9 @@ class Host(Protocol):
 
     def make_timer(self, period_s: float, callback: Callback) -> Any:
         """A timer of steady time."""
+
+    def make_alarm(self, callback: Callback) -> Alarm:
+        """An alarm of ROS time, not set."""
 
     def make_service(self, kind: type, name: str, callback: Callable[[Any, Any], Any]) -> Any:
         """A service; the callback is given a request and a response to fill."""
@@ -140,6 +153,11 @@ class NodeBase:
     def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """A timer of steady time that runs while the node is active."""
         return self._keep(self.host.make_timer(period_s, self.guarded(callback, callback.__name__)))
+
+    def alarm(self, callback: Callable[[], None]) -> Alarm:
+        """An alarm of ROS time that is heard while the node is active. Where time jumps, cancel it."""
+        alarm: Alarm = self._keep(self.host.make_alarm(self.guarded(callback, callback.__name__)))
+        return alarm
 
     def serve(self, kind: type, name: str, answer: Callable[[Any], tuple[bool, str]]) -> Any:
         """A service whose response carries `success` and `reason`."""

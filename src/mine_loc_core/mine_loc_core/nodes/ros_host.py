@@ -31,6 +31,7 @@ from mine_loc_core.parameters import Constraint, constraints, from_mapping
 _WATCH_PERIOD_S = 0.2
 _JUMP_NS = 500_000_000
 _SPIN_S = 0.2
+_NEVER_S = 3600.0  # a timer needs a period
 _GATHER_S = 2e-4
 """So long after a worker was woken what belongs together is there; one batch of four costs a third of four batches."""
 
@@ -95,6 +96,10 @@ class RosHost(LifecycleNode):
         """A timer of rclpy on steady time."""
         return self.create_timer(period_s, callback, clock=self._steady)
 
+    def make_alarm(self, callback: Callback) -> "_Alarm":
+        """A timer of rclpy on ROS time that is cancelled as soon as it has fired."""
+        return _Alarm(self, callback)
+
     def make_service(self, kind: type, name: str, callback: Callable[[Any, Any], Any]) -> Any:
         """A service of rclpy."""
         return self.create_service(kind, name, callback)
@@ -106,11 +111,12 @@ class RosHost(LifecycleNode):
         return worker
 
     def discard(self, entity: Any) -> None:
-        """Destroy a publisher, subscription, timer or service."""
+        """Destroy a publisher, subscription, timer, alarm or service."""
         destroy: dict[type, Callable[[Any], Any]] = {
             LifecyclePublisher: self.destroy_lifecycle_publisher,
             Subscription: self.destroy_subscription,
             Timer: self.destroy_timer,
+            _Alarm: lambda alarm: self.destroy_timer(alarm.timer),
             Service: self.destroy_service,
         }
         destroy[type(entity)](entity)
@@ -186,6 +192,27 @@ class RosHost(LifecycleNode):
     def _publish_diagnostics(self) -> None:
         name = self.get_fully_qualified_name()
         self._diagnostics.publish(to_diagnostic_array(name, self.node.statuses(), self.now_ns()))
+
+
+class _Alarm:
+    def __init__(self, host: RosHost, callback: Callback) -> None:
+        self._now_ns, self._callback = host.now_ns, callback
+        self._due_ns: int | None = None
+        self.timer = host.create_timer(_NEVER_S, self._ring, clock=host.get_clock(), autostart=False)
+
+    def ring_at(self, ros_ns: int) -> None:
+        if self._due_ns is None or ros_ns < self._due_ns:
+            self._due_ns = ros_ns
+            self.timer.timer_period_ns = max(ros_ns - self._now_ns(), 1)
+            self.timer.reset()
+
+    def cancel(self) -> None:
+        self._due_ns = None
+        self.timer.cancel()
+
+    def _ring(self) -> None:
+        self.cancel()
+        self._callback()
 
 
 class _WorkerThread(threading.Thread):

@@ -19,7 +19,6 @@ from mine_loc_core.stamps import NS_PER_MS, to_ns, to_stamp_ns
 from mine_loc_fusion.parameters import SynchroniserParameters
 from mine_loc_fusion.synchroniser import Epoch, Kind, Synchroniser, SyncInput
 
-_POLL_PERIOD_S = 0.002
 _PEOPLE_PERIOD_S = 1.0
 
 
@@ -39,7 +38,7 @@ class SynchroniserNode(NodeBase):
         self._in_other_frames = 0
         self._refused_before: dict[str, int] = {}
         self._epochs = self.publish_to(msg.Epoch, "sync/epochs", EVENTS)
-        self.every(_POLL_PERIOD_S, self._poll)
+        self._deadline = self.alarm(self._poll)
         self.every(_PEOPLE_PERIOD_S, self._reload_people)
         self.subscribe(msg.UwbRangeArray, "uwb/ranges", self._on_ranges, EVENTS)
         self.subscribe(msg.TdoaArray, "uwb/tdoa", lambda m: self._on_tag(Kind.TDOA, m, m.seq), EVENTS)
@@ -66,6 +65,7 @@ class SynchroniserNode(NodeBase):
     def clock_jumped(self, delta_ns: int) -> None:  # noqa: ARG002
         """Stamps before and after do not belong together."""
         self._synchroniser.reset()
+        self._deadline.cancel()
 
     def health(self) -> Iterable[Health]:
         """Inputs used, late, and refused by cause."""
@@ -126,8 +126,7 @@ class SynchroniserNode(NodeBase):
         self._publish(epochs)
 
     def _poll(self) -> None:
-        if self._synchroniser.waiting:
-            self._publish(self._synchroniser.poll(self.now_ns()))
+        self._publish(self._synchroniser.poll(self.now_ns()))
 
     def _publish(self, epochs: Iterable[Epoch]) -> None:
         for epoch in epochs:
@@ -137,6 +136,9 @@ class SynchroniserNode(NodeBase):
             for kind, payloads in epoch.inputs.items():
                 setattr(message, kind.value, payloads)
             self._epochs.publish(message)
+        deadline_ns = self._synchroniser.next_deadline_ns
+        if deadline_ns is not None:
+            self._deadline.ring_at(deadline_ns)
 
 
 def links_received(message: msg.UwbRangeArray) -> int:
