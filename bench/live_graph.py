@@ -13,7 +13,7 @@ from live_feeder import Fed, Feeder, port_of
 from live_streams import SITE, Streams
 from live_watch import Seen, Watch
 
-from mine_loc_bringup.graph import NodeProcess, expand, node_environment
+from mine_loc_bringup.graph import NodeProcess, commands, expand, node_environment
 from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.people import PeopleFile
@@ -66,9 +66,9 @@ class _Live:
         watch = Watch(stages=self._stages)
         nodes, supervisor = self._graph()
         try:
-            await supervisor.set_commands({node.name: node.command for node in nodes})
+            await supervisor.set_commands(commands(nodes))
             await self._until_ready(watch, len(nodes))
-            return await self._measure(feeder, watch, nodes)
+            return await self._measure(feeder, watch, {node.name: node.key for node in nodes})
         finally:
             feeder.kill()
             watch.kill()
@@ -103,8 +103,8 @@ class _Live:
             await asyncio.sleep(0.5)
         await asyncio.sleep(_SETTLE_S)
 
-    async def _measure(self, feeder: Feeder, watch: Watch, nodes: list[NodeProcess]) -> Run:
-        processes = {node.name: psutil.Process(self._pids[node.name]) for node in nodes}
+    async def _measure(self, feeder: Feeder, watch: Watch, kind_of: Mapping[str, str]) -> Run:
+        processes = {name: psutil.Process(pid) for name, pid in self._pids.items()}
         watching = psutil.Process(watch.pid)
         watch.begin()
         feeder.start()
@@ -116,15 +116,16 @@ class _Live:
         await asyncio.sleep(1.0)
         if self._died:
             raise GraphError(f"died: {self._died}")
+        of_kind: dict[str, list[str]] = {}
+        for name in processes:
+            of_kind.setdefault(kind_of.get(name, name), []).append(name)  # what is together has the name of its kind
         usage = {
             kind: Usage(
-                processes=sum(node.key == kind for node in nodes),
-                cpu_share=sum(
-                    (_cpu_s(processes[node.name]) - before[node.name]) / lasted_s for node in nodes if node.key == kind
-                ),
-                rss_mb=sum(processes[node.name].memory_info().rss / 1e6 for node in nodes if node.key == kind),
+                processes=len(names),
+                cpu_share=sum((_cpu_s(processes[name]) - before[name]) / lasted_s for name in names),
+                rss_mb=sum(processes[name].memory_info().rss / 1e6 for name in names),
             )
-            for kind in dict.fromkeys(node.key for node in nodes)
+            for kind, names in of_kind.items()
         }
         watching_share = (_cpu_s(watching) - watched_s) / lasted_s
         return Run(fed, watch.finish(), usage, fed.cpu_s / self._streams.seconds, watching_share)

@@ -48,11 +48,12 @@ class Running:
         return time.monotonic() - started_s
 
     def node_process(self, name: str) -> psutil.Process | None:
-        """The process of a node (name without namespace) of a graph, None while there is none."""
+        """The process of a node (name without namespace, or the kind of all in it), None while there is none."""
         with contextlib.suppress(psutil.NoSuchProcess):
             for child in psutil.Process(self.process.pid).children():
                 with contextlib.suppress(psutil.NoSuchProcess):
-                    if f"__node:={name}" in child.cmdline():
+                    words = child.cmdline()
+                    if f"__node:={name}" in words or words[2:4] == ["mine_loc_bringup.nodes.together", name]:
                         return child
         return None
 

@@ -53,7 +53,7 @@ def test_a_new_person_is_positioned_and_the_others_go_on_undisturbed(graph):
     ]
     walkers = observer.listen(PoseWithCovarianceStamped, "people/walker/pose")
     observer.wait_for(lambda: len(walkers) > 3)
-    before = {name: graph.up.node_process(name).pid for name in NODES if name != "n100_driver"}
+    before = {name: graph.up.node_process(name).pid for name in NODES}
     people = [person("walker", WALKER_TAG, graph.folder / "n100"), person("visitor", VISITOR_TAG)]
 
     write_people(site, [*people, person("newcomer", NEWCOMER_TAG, newcomer.line.port)])
@@ -69,7 +69,7 @@ def test_a_new_person_is_positioned_and_the_others_go_on_undisturbed(graph):
     assert max(later - earlier for earlier, later in itertools.pairwise(arrivals)) < 1.0
 
     write_people(site, people)
-    observer.wait_for(lambda: "[newcomer/n100_driver] stopped" in graph.up.output)
+    observer.wait_for(lambda: "[n100_driver] newcomer/n100_driver stopped" in graph.up.output)
 
 
 def test_a_bad_edit_is_reported_and_changes_nothing(graph):

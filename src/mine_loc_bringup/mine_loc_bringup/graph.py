@@ -6,7 +6,7 @@ import operator
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -20,6 +20,7 @@ from mine_loc_core.people import People
 from mine_loc_core.site import Discovery, Site, load_site
 
 _FAST_DDS_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_TOGETHER = "mine_loc_bringup.nodes.together"
 _REFERENCE = re.compile(r"\{([a-z0-9_.]+)\}")
 
 
@@ -43,6 +44,7 @@ class NodeSpec:
     namespace: str = "/"
     parameters: Mapping[str, Any] = field(default_factory=dict)
     driven_by: Sequence[str] = ()
+    together: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +123,23 @@ def expand(
         if name not in allowed:
             raise ConfigurationError(f"--only: {name}: no such node here; allowed: {', '.join(allowed)}")
     return [process for process in processes if not only or process.key in only or process.name in only]
+
+
+def commands(nodes: Iterable[NodeProcess], only: Collection[str] = ()) -> dict[str, list[str]]:
+    """What to execute, by the name of the process: one a node, but one for all nodes of a kind that is `together`.
+
+    That one follows people.yaml by itself (nodes/together.py), within `only` as `expand` was given it.
+    """
+    together = {spec.key for spec in read_graph() if spec.together}
+    found: dict[str, list[str]] = {}
+    for node in nodes:
+        if node.key in together:
+            words = ["--sim-time"] if node.parameters.get("use_sim_time") else []
+            words += ["--only", *only] if only else []
+            found[node.key] = [sys.executable, "-m", _TOGETHER, node.key, "--site", node.parameters["site"], *words]
+        else:
+            found[node.name] = node.command
+    return found
 
 
 def discovery_environment(discovery: Discovery) -> dict[str, str]:

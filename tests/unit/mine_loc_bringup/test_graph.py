@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from mine_loc_bringup.graph import NodeProcess, discovery_environment, expand, node_environment, read_graph
+from mine_loc_bringup.graph import NodeProcess, commands, discovery_environment, expand, node_environment, read_graph
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.parameters import constraints
 from mine_loc_core.people import People, load_people
@@ -89,6 +89,19 @@ def test_the_command_runs_the_module_under_its_ros_name():
         *("-p", f'site:="{FOLDER}"', "-p", 'person:="fitter"'),
         *("-p", 'port:="socket://192.168.10.41:8234"', "-p", "baud:=921600"),
     ]
+
+
+def test_all_n100s_share_a_process_that_is_told_what_it_serves_and_all_else_has_its_own():
+    nodes = expand(SITE, PEOPLE, FOLDER, use_sim_time=True)
+    found = commands(nodes)
+    drivers = {node.name for node in nodes if node.key == "n100_driver"}
+    assert len(drivers) == 2
+    assert found.keys() == {node.name for node in nodes} - drivers | {"n100_driver"}
+    assert found["fusion"] == node("fusion", use_sim_time=True).command
+    words = [sys.executable, "-m", "mine_loc_bringup.nodes.together", "n100_driver", "--site", str(FOLDER)]
+    assert found["n100_driver"] == [*words, "--sim-time"]
+    one = ["driver/n100_driver"]
+    assert commands(expand(SITE, PEOPLE, FOLDER, only=one), one) == {"n100_driver": [*words, "--only", *one]}
 
 
 def test_values_of_parameters_keep_their_type_on_the_way_through_yaml():

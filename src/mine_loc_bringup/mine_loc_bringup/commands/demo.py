@@ -33,7 +33,7 @@ from mine_loc_bringup.demo.playback import Playback
 from mine_loc_bringup.demo.report import PersonReport, person_report, plot, together
 from mine_loc_bringup.demo.table import people_table
 from mine_loc_bringup.evaluation.track import Track
-from mine_loc_bringup.graph import expand, node_environment
+from mine_loc_bringup.graph import commands, expand, node_environment
 from mine_loc_bringup.recordings.public_data import DATA_VARIABLE
 from mine_loc_bringup.site_folder import write_site_folder
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
@@ -108,7 +108,7 @@ class _Demo:
         from mine_loc_bringup.nodes.demo_watch import DemoWatch  # noqa: PLC0415 only here ROS is needed
 
         site, people = load_site(self._folder), PeopleFile(self._folder).people
-        commands = {node.name: node.command for node in expand(site, people, self._folder)}
+        nodes = expand(site, people, self._folder)
         self._watch = DemoWatch([person.name for person in people], self._out / "bag")
         supervisor = Supervisor(node_environment(site.discovery), self._on_event, self._console.line)
         self._players = [Player(self._lines[name], arrivals) for name, arrivals in self._recording.lines.items()]
@@ -116,8 +116,8 @@ class _Demo:
         for number in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(number, interrupted.set)
         try:
-            await supervisor.set_commands(commands)
-            if not await self._until_ready(len(commands), interrupted):
+            await supervisor.set_commands(commands(nodes))
+            if not await self._until_ready(len(nodes), interrupted):
                 return 1
             await self._play(interrupted)
         finally:

@@ -1,8 +1,8 @@
 """Run the node graph of a site until Ctrl-C.
 
-One process a node. A node that dies is restarted, first after 0.1 s, then with growing delays up to 10 s.
-people.yaml may be edited meanwhile: nodes of new people start, those of others stop; a bad edit is reported and changes
-nothing. Discovery of other ROS 2 nodes stays on this host unless site.yaml says otherwise.
+One process a node, and one for the drivers of all N100s. A process that dies is restarted, first after 0.1 s, then with
+growing delays up to 10 s. people.yaml may be edited meanwhile: drivers of new people start, those of others stop; a bad
+edit is reported and changes nothing. Discovery of other ROS 2 nodes stays on this host unless site.yaml says otherwise.
 
 Examples:
   mine-loc up --site config/example_mine
@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mine_loc_bringup.console import Console
-from mine_loc_bringup.graph import expand, node_environment
+from mine_loc_bringup.graph import commands, expand, node_environment
 from mine_loc_bringup.supervisor import Event, EventKind, Supervisor
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.people import People, PeopleFile
@@ -47,9 +47,9 @@ async def _run(arguments: argparse.Namespace) -> int:
     folder: Path = arguments.site
     site, people_file = load_site(folder), PeopleFile(folder)
 
-    def commands(people: People) -> dict[str, list[str]]:
+    def serve(people: People) -> dict[str, list[str]]:
         nodes = expand(site, people, folder, use_sim_time=arguments.sim_time, only=arguments.only)
-        return {node.name: node.command for node in nodes}
+        return commands(nodes, arguments.only)
 
     console = Console()
     killed: list[str] = []
@@ -59,11 +59,11 @@ async def _run(arguments: argparse.Namespace) -> int:
         if event.kind is EventKind.KILLED:
             killed.append(event.name)
 
-    wanted = commands(people_file.people)
+    wanted = serve(people_file.people)
     supervisor = Supervisor(node_environment(site.discovery), on_event, console.line)
     stop = _stop_on_signals()
     await supervisor.set_commands(wanted)
-    following = asyncio.create_task(_follow(people_file, commands, supervisor, console))
+    following = asyncio.create_task(_follow(people_file, serve, supervisor, console))
     await asyncio.wait({asyncio.create_task(stop.wait()), following}, return_when=asyncio.FIRST_COMPLETED)
     following.cancel()
     await supervisor.stop()
@@ -79,7 +79,7 @@ def _stop_on_signals() -> asyncio.Event:
 
 async def _follow(
     people_file: PeopleFile,
-    commands: Callable[[People], dict[str, list[str]]],
+    serve: Callable[[People], dict[str, list[str]]],
     supervisor: Supervisor,
     console: Console,
 ) -> None:
@@ -91,7 +91,7 @@ async def _follow(
         problem = people_file.error
         try:
             if people is not None:
-                await supervisor.set_commands(commands(people))
+                await supervisor.set_commands(serve(people))
         except ConfigurationError as error:
             problem = str(error)
         if problem and problem != told:

@@ -5,8 +5,6 @@ late or in wrong order is so again. Nodes take no time; only the waits that they
 states, a classifier's for the rest of a round, a timer's) pass, in the bag's time.
 """
 
-import importlib
-import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
@@ -19,7 +17,7 @@ from mine_loc_bringup.message_types import type_name
 from mine_loc_bringup.nodes.offline_host import Letter, OfflineGraph, OfflineHost, Sink
 from mine_loc_bringup.virtual_time import VirtualTime
 from mine_loc_core.errors import ConfigurationError
-from mine_loc_core.nodes.node_base import NodeBase
+from mine_loc_core.nodes.node_base import node_class
 from mine_loc_core.people import load_people
 from mine_loc_core.site import load_site
 
@@ -42,7 +40,7 @@ class OfflineReplay:
         self._time = VirtualTime(start_ns)
         self._graph = OfflineGraph(self._time, sink)
         processes = _driven(topics, site_folder, changes or {})
-        self._hosts = [OfflineHost(_node_class(process), process, self._graph) for process in processes]
+        self._hosts = [OfflineHost(node_class(process.module), process, self._graph) for process in processes]
         for host in self._hosts:
             host.configure()
         for host in self._hosts:
@@ -102,12 +100,3 @@ def _driven(topics: Mapping[str, str], site_folder: Path, changes: Changes) -> S
             names = ", ".join(process.key for process in processes)
             raise ConfigurationError(f"--set {key}: not a node of this replay; allowed: {names}")
     return [replace(each, parameters={**each.parameters, **changes.get(each.key, {})}) for each in processes]
-
-
-def _node_class(process: NodeProcess) -> type[NodeBase]:
-    module = importlib.import_module(process.module)
-    return next(
-        kind
-        for _, kind in inspect.getmembers(module, inspect.isclass)
-        if issubclass(kind, NodeBase) and kind.__module__ == module.__name__
-    )

@@ -4,6 +4,8 @@ A node is carried by a host: `RosHost` in the live graph, the offline replay's i
 in both.
 """
 
+import importlib
+import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from typing import Any, ClassVar, Protocol
@@ -82,6 +84,13 @@ class Host(Protocol):
 
     def error(self, text: str, *, repeated: bool = False) -> None:
         """Into the log; what may come `repeated` is told once a second."""
+
+
+def node_class(module_name: str) -> "type[NodeBase]":
+    """The class of the node that a module is. Raises ImportError where there is no such module."""
+    module = importlib.import_module(module_name)
+    kinds = (kind for kind in vars(module).values() if inspect.isclass(kind) and kind.__module__ == module_name)
+    return next(kind for kind in kinds if issubclass(kind, NodeBase))
 
 
 class NodeBase:

@@ -1,10 +1,11 @@
 """The live graph's host of a node: an rclpy lifecycle node that starts itself and tells its health once a second."""
 
+import contextlib
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import rclpy
@@ -16,6 +17,7 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
+from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
@@ -39,8 +41,9 @@ _GATHER_S = 2e-4
 class RosHost(LifecycleNode):
     """Carries one node. What is ROS of a node is here, what is the node's own is in NodeBase."""
 
-    def __init__(self, node_class: type[NodeBase]) -> None:
-        super().__init__(node_class.default_name)
+    def __init__(self, node_class: type[NodeBase], arguments: list[str] | None = None) -> None:
+        """`arguments` are ROS arguments of this node alone; without, those of the process hold."""
+        super().__init__(node_class.default_name, cli_args=arguments, use_global_arguments=arguments is None)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.node = node_class(self)
         self.add_on_set_parameters_callback(self._on_set_parameters)
@@ -274,28 +277,42 @@ def run(node_class: type[NodeBase], on_made: Callable[[Any], None] = lambda _: N
 
     Without a lifecycle manager the node configures and activates itself (parameter `autostart`).
     """
+    host = None
+    with ros(sys.argv) as stopping:
+        try:
+            host = RosHost(node_class)
+            on_made(host.node)
+            if host.node.parameters.autostart and not host.start():
+                return 2  # the transition has logged why
+            executor = EventsExecutor()
+            executor.add_node(host)
+            while not stopping.is_set():
+                spin_some(executor)
+        except ConfigurationError as error:
+            print(error, file=sys.stderr)
+            return 2
+        finally:
+            if host is not None:
+                host.node.leave_active()
+    return 0
+
+
+@contextlib.contextmanager
+def ros(arguments: list[str]) -> Iterator[threading.Event]:
+    """ROS in this process, and an event that SIGINT and SIGTERM set."""
     stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
-    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    host = None
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        host = RosHost(node_class)
-        on_made(host.node)
-        if host.node.parameters.autostart and not host.start():
-            return 2  # the transition has logged why
-        executor = EventsExecutor()
-        executor.add_node(host)
-        while not stopping.is_set():  # not spin(): the events executor's burns a core and never returns (rclpy 7.1.6)
-            try:
-                executor.spin_once(timeout_sec=_SPIN_S)
-            except RCLError as error:  # rclpy raises it for an impossible change_state request (ros2/rclpy#1209)
-                host.get_logger().error(str(error))
-    except ConfigurationError as error:
-        print(error, file=sys.stderr)
-        return 2
+        yield stopping
     finally:
-        if host is not None:
-            host.node.leave_active()
         rclpy.try_shutdown()
-    return 0
+
+
+def spin_some(executor: EventsExecutor) -> None:
+    """Let nodes work for a while. Not spin(): the events executor's burns a core and never returns (rclpy 7.1.6)."""
+    try:
+        executor.spin_once(timeout_sec=_SPIN_S)
+    except RCLError as error:  # rclpy raises it for an impossible change_state request (ros2/rclpy#1209)
+        get_logger("executor").error(str(error))
