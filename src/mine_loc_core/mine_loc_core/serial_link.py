@@ -1,13 +1,11 @@
-"""A serial line that may vanish: device, pty or TCP bridge, read by a thread into a bounded queue.
+"""A serial line that may vanish: device, pty or TCP bridge, read into a bounded queue by the process's port reader.
 
 The port is resolved anew at every connection, so a device that comes back under another name is found again:
 a path, a glob pattern (`/dev/ttyACM*`), `socket://host:port`, or `hwgrep://VID:PID` (pyserial's URL handlers).
 """
 
 import glob
-import os
 import random
-import select
 import termios
 import threading
 import time
@@ -17,8 +15,8 @@ from dataclasses import dataclass
 
 import serial
 
-_READ_SIZE = 4096
-_POLL_S = 0.2
+from mine_loc_core.port_reader import port_reader
+
 _FIRST_RETRY_S = 0.2
 _LAST_RETRY_S = 2.0
 _QUEUE_CHUNKS = 1024
@@ -48,8 +46,8 @@ class LinkStatus:
 class SerialLink:
     """Reads a port for ever: reconnects with back-off and jitter, never raises from its thread.
 
-    `wake` is called from the reader thread after something was queued. `silence_s` closes a line that stayed silent
-    for so long, because a TCP bridge that lost power does not say so.
+    `wake` is called after something was queued, from the thread of this link or of the port reader, never both at
+    once. `silence_s` closes a line that was silent for so long, because a TCP bridge that lost power does not say so.
     """
 
     def __init__(
@@ -63,7 +61,8 @@ class SerialLink:
         self._queue: deque[Chunk] = deque()
         self._queue_lock = threading.Lock()
         self._port_lock = threading.Lock()
-        self._stop = threading.Event()
+        self._stopped = False
+        self._woken = threading.Event()  # the link's thread: the port has failed, or is to be closed
         self._port: serial.SerialBase | None = None
         self._name = ""
         self._error = "not opened yet"
@@ -77,7 +76,8 @@ class SerialLink:
 
     def stop(self) -> None:
         """Stop reading and close the port; returns within a second."""
-        self._stop.set()
+        self._stopped = True
+        self._woken.set()
         if self._thread.is_alive():
             self._thread.join(timeout=1.0)
 
@@ -106,12 +106,15 @@ class SerialLink:
 
     def _run(self) -> None:
         retry_s = _FIRST_RETRY_S
-        while not self._stop.is_set():
+        while not self._stopped:
+            self._woken.clear()
             if self._open():
                 retry_s = _FIRST_RETRY_S
                 self._read_until_it_fails()
                 self._close()
-            self._stop.wait(retry_s * random.uniform(0.5, 1.0))  # noqa: S311 jitter, not a secret
+            self._woken.clear()
+            if not self._stopped:
+                self._woken.wait(retry_s * random.uniform(0.5, 1.0))  # noqa: S311 jitter, not a secret
             retry_s = min(2 * retry_s, _LAST_RETRY_S)
 
     def _open(self) -> bool:
@@ -123,7 +126,6 @@ class SerialLink:
                 continue
             self._name, self._error = name, ""
             self._connections += 1
-            self._last_heard = time.monotonic()
             self._put(b"")
             return True
         return False
@@ -140,22 +142,24 @@ class SerialLink:
         assert self._port is not None
         try:
             descriptor = self._port.fileno()
-            while not self._stop.is_set():
-                if not select.select([descriptor], [], [], _POLL_S)[0]:
-                    if time.monotonic() - self._last_heard > self._silence_s:
-                        self._error = f"silent for {self._silence_s:g} s"
-                        return
-                    continue
-                data = os.read(descriptor, _READ_SIZE)
-                if not data:
-                    self._error = "closed by the other side"
-                    return
-                self._last_heard = time.monotonic()
-                self._put(data)
+            port_reader().add(descriptor, self._put, self._fail)
         except _FAILURES as error:
             self._error = str(error)
+            return
+        while not (self._woken.is_set() or self._stopped):
+            left_s = self._last_heard + self._silence_s - time.monotonic()
+            if left_s <= 0.0:
+                self._error = f"silent for {self._silence_s:g} s"
+                break
+            self._woken.wait(left_s)
+        port_reader().remove(descriptor)
+
+    def _fail(self, problem: str) -> None:
+        self._error = problem
+        self._woken.set()
 
     def _put(self, data: bytes) -> None:
+        self._last_heard = time.monotonic()
         self._bytes_read += len(data)
         with self._queue_lock:
             if len(self._queue) >= _QUEUE_CHUNKS:
