@@ -218,6 +218,9 @@ class Pdr(NodeBase):
             self._landmark_fixes.publish(to_landmark_fix(fix, track.person.name, self._site.map_frame))
 
     def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
+        followed = self._tf.get_subscription_count()
+        if not (followed or track.odometry.get_subscription_count()):
+            return
         name = track.person.name
         odometry = Odometry(child_frame_id=f"{name}/base_link")
         odometry.header = Header(stamp=to_time(pose.stamp_ns), frame_id=f"{name}/odom")
@@ -227,6 +230,8 @@ class Pdr(NodeBase):
         odometry.pose.covariance = _covariance(pose)
         odometry.twist.covariance[::7] = _FLAT_VARIANCE
         track.odometry.publish(odometry)
+        if not followed:
+            return
         transform = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
         transform.transform.translation.x, transform.transform.translation.y = pose.x_m, pose.y_m
         transform.transform.rotation = body.orientation
