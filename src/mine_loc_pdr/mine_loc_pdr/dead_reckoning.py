@@ -263,9 +263,11 @@ class PedestrianDeadReckoning:
     def _walk(self, attitude: AttitudeFilter, step: Step) -> StepEvent:
         heading_rad = self._direction(attitude, step)
         self._carry_drift()
-        self._drift.turn(math.remainder(heading_rad - self._step_heading_rad, math.tau))
+        turn_rad = math.remainder(heading_rad - self._step_heading_rad, math.tau)
+        self._drift.turn(turn_rad)
         self._step_heading_rad = heading_rad
-        length_m = self._stride.length_m(self._frequency_hz(step), step.swing_m_s2)
+        while_walking_rad = 0.0 if step.interval_s is None else turn_rad
+        length_m = self._stride.length_m(self._frequency_hz(step), step.swing_m_s2, while_walking_rad)
         dx_m, dy_m = length_m * math.cos(heading_rad), length_m * math.sin(heading_rad)
         own_variance_m2 = STEP_TO_STEP_SD_M**2 + (1.0 - step.confidence) * length_m**2
         along_sd_m = math.sqrt(own_variance_m2 + MISSED_STEP_SHARE * length_m**2)

@@ -16,6 +16,10 @@ TYPICAL_FREQUENCY_HZ = 1.79
 UNCALIBRATED_SCALE_VARIANCE = 0.13**2
 PENDULUM_SCALE_VARIANCE = 0.06**2
 PENDULUM_FACTOR = 0.42  # least squares over the same walks
+# A step slower than this holds a pause, in which the waist swings no further: of 0.6 to 1 s the best on ipol_gait_lowerback.
+SLOWEST_STEP_S = 0.75
+# Steps in a turn are shorter than their swing says, by exp(-|turn| / TURN_RAD): least squares over simulated turns.
+TURN_RAD = 3.0
 # No one walks with longer steps, by body height; a knock, or a step missed before, must not make one.
 LONGEST_STEP_SHARE = 0.6
 # Assumed: step to step at constant frequency, no public recording at hand measures single steps.
@@ -33,9 +37,10 @@ class StepLengthModel(Protocol):
     def scale_variance(self) -> float:
         """Of the error of K."""
 
-    def length_m(self, frequency_hz: float | None, swing_m_s2: float) -> float:
+    def length_m(self, frequency_hz: float | None, swing_m_s2: float, turn_rad: float = 0.0) -> float:
         """Length of a step at `frequency_hz` steps a second, None (a first step) counts as the typical frequency;
-        `swing_m_s2` is the vertical acceleration of the waist from valley to peak.
+        `swing_m_s2` is the vertical acceleration of the waist from valley to peak, `turn_rad` the angle between the
+        directions of the step before and this one.
         """
 
     def scaled(self, scale: float, variance: float) -> "StepLengthModel":
@@ -52,8 +57,8 @@ class StrideModel:
     scale: float = 1.0
     scale_variance: float = UNCALIBRATED_SCALE_VARIANCE
 
-    def length_m(self, frequency_hz: float | None, swing_m_s2: float = 0.0) -> float:  # noqa: ARG002
-        """See StepLengthModel; the swing plays no part."""
+    def length_m(self, frequency_hz: float | None, swing_m_s2: float = 0.0, turn_rad: float = 0.0) -> float:  # noqa: ARG002
+        """See StepLengthModel; swing and turn play no part."""
         faster_hz = 0.0 if frequency_hz is None else frequency_hz - TYPICAL_FREQUENCY_HZ
         by_height_m = self.alpha * (self.height_m - TYPICAL_HEIGHT_M)
         by_frequency_m = self.beta * faster_hz * self.height_m / TYPICAL_HEIGHT_M
@@ -66,7 +71,7 @@ class StrideModel:
 
 @dataclass(frozen=True, slots=True)
 class PendulumStrideModel:
-    """The waist as the top of an inverted pendulum: L = c √(H · swing) / SF · K.
+    """The waist as the top of an inverted pendulum: L = c √(H · swing) / SF · exp(-|turn| / TURN_RAD) · K.
 
     A waist that moves up and down by h on a leg of length l ∝ H makes steps of 2 √(2 l h) (Zijlstra and Hof,
     "Assessment of spatio-temporal gait parameters from trunk accelerations during human walking", Gait & Posture 18,
@@ -77,11 +82,12 @@ class PendulumStrideModel:
     scale: float = 1.0
     scale_variance: float = PENDULUM_SCALE_VARIANCE
 
-    def length_m(self, frequency_hz: float | None, swing_m_s2: float) -> float:
+    def length_m(self, frequency_hz: float | None, swing_m_s2: float, turn_rad: float = 0.0) -> float:
         """See StepLengthModel."""
         rise = math.sqrt(self.height_m * swing_m_s2)
-        length_m = PENDULUM_FACTOR * rise / (frequency_hz or TYPICAL_FREQUENCY_HZ)
-        return min(length_m, LONGEST_STEP_SHARE * self.height_m) * self.scale
+        lasts_s = min(1.0 / (frequency_hz or TYPICAL_FREQUENCY_HZ), SLOWEST_STEP_S)
+        straight_m = min(PENDULUM_FACTOR * rise * lasts_s, LONGEST_STEP_SHARE * self.height_m)
+        return straight_m * math.exp(-abs(turn_rad) / TURN_RAD) * self.scale
 
     def scaled(self, scale: float, variance: float) -> "PendulumStrideModel":
         """The same with another K."""
