@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 def ringing(rng: np.random.Generator, times_s: Array, strikes_s: Array) -> Array:
     """Acceleration (n, 3) at times (n,) in m/s²: 4 to 14 Hz, 0.5 to 8 m/s², alike after each strike.
 
-    It decays within 0.05 to 1.5 s, so that it may last from strike to strike, and may change its sign from foot to foot.
+    It decays within 0.05 to 1.5 s, so that it may last from strike to strike, and may change its sign with the foot.
     """
     frequency_hz, strength_m_s2, decay_s = between(rng, 4.0, 14.0), between(rng, 0.5, 8.0), between(rng, 0.05, 1.5)
     phase_rad, other_foot = rng.uniform(0.0, math.tau), rng.choice([-1.0, 1.0])

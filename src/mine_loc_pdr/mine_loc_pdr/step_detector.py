@@ -14,7 +14,7 @@ import numpy as np
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_s
 from mine_loc_pdr.step_frames import FRAME_NS, FrameStream
 from mine_loc_pdr.step_kernel import Floats, StepStream
-from mine_loc_pdr.steps import ADAPTATION, FIRST_INTERVAL_S, LONGEST_INTERVAL_NS, Motion, Step
+from mine_loc_pdr.steps import ADAPTATION, FIRST_INTERVAL_S, LONGEST_INTERVAL_NS, SLOWEST_STEP_S, Motion, Step
 
 LOOKAHEAD_S = 0.3
 SHORTEST_INTERVAL_NS = 280 * NS_PER_MS
@@ -86,10 +86,7 @@ class NetworkStepDetector:
         if _odds(probability) < self._needed_odds(interval_s):
             return None
         swing_m_s2 = self._swing_m_s2(_FIRST_SWING_FRAMES if interval_s is None else self._since_step)
-        usual_s = self._usual_interval_s
-        self._usual_interval_s = (
-            FIRST_INTERVAL_S if interval_s is None else usual_s + ADAPTATION * (interval_s - usual_s)
-        )
+        self._keep_rhythm(interval_s)
         self._last_step_ns, self._since_step = stamp_ns, 0
         return Step(stamp_ns, interval_s, swing_m_s2, _confidence(probability))
 
@@ -98,6 +95,13 @@ class NetworkStepDetector:
         if interval_s is None:
             return _odds(_FIRST_PROBABILITY)
         return self._rhythm_odds * max(1.0, self._usual_interval_s / interval_s) ** _EARLY_POWER
+
+    def _keep_rhythm(self, interval_s: float | None) -> None:
+        """Learn from the interval before a step, None after standing; a pause in it is no part of the rhythm."""
+        if interval_s is None:
+            self._usual_interval_s = FIRST_INTERVAL_S
+        else:
+            self._usual_interval_s += ADAPTATION * (min(interval_s, SLOWEST_STEP_S) - self._usual_interval_s)
 
     def _swing_m_s2(self, frames: int) -> float:
         """From valley to peak of the smoothed vertical acceleration in the last frames."""
@@ -114,4 +118,4 @@ def _confidence(probability: float) -> float:
 
     The network is less sure than it could be: a strike's neighbours share its probability.
     """
-    return 1.0 / (1.0 + math.exp(-0.7) * math.pow(1.0 / probability - 1.0, 1.8))
+    return 1.0 / (1.0 + math.exp(-1.2) * math.pow(1.0 / probability - 1.0, 2.1))

@@ -25,6 +25,7 @@ MEDIAN_WINDOW_NS = 75 * NS_PER_MS
 MEAN_WINDOW_NS = 120 * NS_PER_MS
 SHORTEST_INTERVAL_NS = 300 * NS_PER_MS
 LONGEST_INTERVAL_NS = 1500 * NS_PER_MS  # what comes later starts a new walk
+SLOWEST_STEP_S = 0.75  # what takes longer holds a pause: of 0.6 to 1 s the best for lengths on ipol_gait_lowerback
 # The heel strikes this long after the smoothed acceleration rises through zero: median over ipol_gait_lowerback.
 STRIKE_AFTER_RISE_NS = 65 * NS_PER_MS
 # Half waves of the slowest walk; what takes longer is no step, and would be reported late.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from mine_loc_core.people import Person
+from mine_loc_pdr.steps import SLOWEST_STEP_S
 
 TYPICAL_HEIGHT_M = 1.75
 TYPICAL_FREQUENCY_HZ = 1.79
@@ -15,10 +16,8 @@ TYPICAL_FREQUENCY_HZ = 1.79
 # paper B's model is 10 % long in the mean, sd 9 %; the pendulum's people differ by 5 %, each held out in turn.
 UNCALIBRATED_SCALE_VARIANCE = 0.13**2
 PENDULUM_SCALE_VARIANCE = 0.06**2
-PENDULUM_FACTOR = 0.42  # least squares over the same walks
-# A step slower than this holds a pause, in which the waist swings no further: of 0.6 to 1 s the best on ipol_gait_lowerback.
-SLOWEST_STEP_S = 0.75
-# Steps in a turn are shorter than their swing says, by exp(-|turn| / TURN_RAD): least squares over simulated turns.
+PENDULUM_FACTOR = 0.434  # least squares over the same walks
+# Steps in a turn are shorter than their swing says by exp(-|turn| / TURN_RAD): least squares over simulated turns.
 TURN_RAD = 3.0
 # No one walks with longer steps, by body height; a knock, or a step missed before, must not make one.
 LONGEST_STEP_SHARE = 0.6
