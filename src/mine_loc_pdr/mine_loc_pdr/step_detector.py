@@ -94,7 +94,7 @@ class NetworkStepDetector:
         """Of a maximum so long after the step before, None after standing."""
         if interval_s is None:
             return _odds(_FIRST_PROBABILITY)
-        return self._rhythm_odds * max(1.0, self._usual_interval_s / interval_s) ** _EARLY_POWER
+        return self._rhythm_odds * math.pow(max(1.0, self._usual_interval_s / interval_s), _EARLY_POWER)
 
     def _keep_rhythm(self, interval_s: float | None) -> None:
         """Learn from the interval before a step, None after standing; a pause in it is no part of the rhythm."""

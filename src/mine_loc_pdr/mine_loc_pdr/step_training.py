@@ -1,8 +1,8 @@
 """Training of the step network on walks whose heel strikes are marked, so that it also knows other people and devices.
 
 Crops of walks are stretched in time (slower and faster walkers), turned about the vertical (any yaw of the mounting),
-mirrored, scaled, given noise and offsets; some ring (`ringing.py`). Among them are drawn motions that
-hold no step (`shaking.py`). Times are seconds from the first frame's end; draws come from the seed alone.
+mirrored, scaled, given noise and offsets; some ring (`ringing.py`). Among them are drawn motions that hold no step
+(`shaking.py`). Times are seconds from the first frame's end; draws come from the seed alone.
 """
 
 import math
@@ -85,13 +85,13 @@ def _crop(rng: np.random.Generator, walk: MarkedMotion) -> tuple[Array, Array, A
     """A piece of a walk, as if the same way took `slower` times as long, so that accelerations go with its square."""
     slower = math.exp(rng.uniform(*_STRETCH))
     first = rng.uniform(-30.0, max(1.0, len(walk.frames) - 0.7 * _FRAMES / slower))
-    places = first + np.arange(_FRAMES) / slower
-    frames = np.column_stack([np.interp(places, np.arange(len(walk.frames)), column) for column in walk.frames.T])
+    places, rows = first + np.arange(_FRAMES) / slower, np.arange(len(walk.frames))
+    frames: Array = np.column_stack([np.interp(places, rows, column) for column in walk.frames.T])
     frames[:, :3] /= slower**2
     frames[:, 3:] /= slower
-    times_s = np.arange(_FRAMES) * _FRAME_S
-    strikes_s = (walk.strikes_s - first * _FRAME_S) * slower + LOOKAHEAD_S
-    near = strikes_s[(strikes_s > -1.0) & (strikes_s < times_s[-1] + 1.0)]
+    times_s = np.arange(_FRAMES, dtype=np.float64) * _FRAME_S
+    strikes_s: Array = (walk.strikes_s - first * _FRAME_S) * slower + LOOKAHEAD_S
+    near: Array = strikes_s[(strikes_s > -1.0) & (strikes_s < times_s[-1] + 1.0)]
     if rng.random() < _RINGING_SHARE:
         frames[:, :3] += ringing(rng, times_s, near - LOOKAHEAD_S)
     target = np.exp(-0.5 * ((times_s[:, None] - near) / _STRIKE_SD_S) ** 2).max(axis=1, initial=0.0)
