@@ -29,6 +29,7 @@ import pdr_shaken
 import pdr_steps
 import pdr_streams
 from pdr_recordings import Recording
+from pdr_references import references
 from pdr_step_network import held_out_weights
 from pdr_tracks import shipped_detector, track
 from rich.console import Console
@@ -65,7 +66,11 @@ def mobgap() -> dict[str, Any]:
     """Short walks and a simulation of daily activities."""
     recordings = list(pdr_recordings.mobgap())
     tracks = [track(recording, shipped_detector()) for recording in recordings]
-    return {"steps": pdr_steps.mobgap(recordings), "distance": pdr_distance.mobgap(recordings, tracks)}
+    return {
+        "steps": pdr_steps.mobgap(recordings),
+        "distance": pdr_distance.mobgap(recordings, tracks),
+        "references": references(recordings, tracks),
+    }
 
 
 def streams() -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from gait_recordings import WALKED_M, Array
 from pdr_recordings import Recording
+from pdr_references import by_mean_stride
 from pdr_tracks import HALT_S, SEARCH_S, UNKNOWN_HEIGHT_M, Track, inside, spread, track
 
 from mine_loc_pdr.steps import StepDetector
@@ -106,11 +107,11 @@ def _figures(errors_pct: Array, people: np.ndarray) -> dict[str, Any]:
 
 def mobgap(recordings: Sequence[Recording], tracks: Sequence[Track]) -> dict[str, Any]:
     """Walked metres of all bouts of a recording, the model as on ipol and the height taken for 1.70 m."""
-    errors = []
-    for recording, found in zip(recordings, tracks, strict=True):
-        true_m = sum(metres for *_, metres in recording.bouts)
-        errors.append(100.0 * (walked_m(recording, found) / true_m - 1.0))
+    walked = [walked_m(recording, found) for recording, found in zip(recordings, tracks, strict=True)]
+    true = [sum(metres for *_, metres in recording.bouts) for recording in recordings]
+    errors = 100.0 * (np.array(walked) / true - 1.0)
     return {
         "distance_error_pct": spread(np.abs(errors)),
-        "distance_per_recording_pct": {r.name: round(e, 1) for r, e in zip(recordings, errors, strict=True)},
+        "distance_per_recording_pct": {r.name: round(e, 1) for r, e in zip(recordings, errors.tolist(), strict=True)},
+        "by_mean_stride": by_mean_stride(recordings, walked),
     }

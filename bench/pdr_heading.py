@@ -8,7 +8,7 @@ import ahrs
 import imufusion
 import numpy as np
 from gait_recordings import RATE_HZ, Array
-from pdr_recordings import STANDARD_GRAVITY_M_S2, START_NS, Recording
+from pdr_recordings import STANDARD_GRAVITY_M_S2, Recording
 from pdr_tracks import HALT_S, Track, inside, spread
 
 from mine_loc_pdr.attitude import AttitudeFilter, turned
@@ -25,7 +25,7 @@ def unbiased(recording: Recording) -> Array:
 
 def plain_gyro(recording: Recording) -> Heading:
     """The turn rate about the vertical of the start, integrated: no gravity afterwards."""
-    times_s = (recording.stamps_ns - START_NS) * 1e-9
+    times_s = recording.samples_s
     up = recording.force_m_s2[: int(_LEVELLING_S * RATE_HZ)].mean(axis=0)
     rate = unbiased(recording) @ (up / np.linalg.norm(up))
     return times_s, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(times_s))])
@@ -33,7 +33,7 @@ def plain_gyro(recording: Recording) -> Heading:
 
 def paper_b(recording: Recording) -> Heading:
     """Its quaternion integration and heading (equations 4 to 6) from a level start: no bias, no gravity afterwards."""
-    times_s = (recording.stamps_ns - START_NS) * 1e-9
+    times_s = recording.samples_s
     fx, fy, fz = recording.force_m_s2[: int(_LEVELLING_S * RATE_HZ)].mean(axis=0).tolist()
     q = AttitudeFilter((fx, fy, fz)).orientation_imu
     yaw = []
@@ -46,7 +46,7 @@ def paper_b(recording: Recording) -> Heading:
 
 def with_imufusion(recording: Recording) -> Heading:
     """Its AHRS and its bias estimator with their default settings."""
-    times_s = (recording.stamps_ns - START_NS) * 1e-9
+    times_s = recording.samples_s
     fusion, bias = imufusion.Ahrs(), imufusion.Bias()
     gyro, force = np.degrees(unbiased(recording)), recording.force_m_s2 / STANDARD_GRAVITY_M_S2
     yaw = []
@@ -59,7 +59,7 @@ def with_imufusion(recording: Recording) -> Heading:
 
 def with_ahrs(recording: Recording) -> Heading:
     """Its Madgwick filter, default gain, on a grid with lost rows filled in."""
-    times_s = (recording.stamps_ns - START_NS) * 1e-9
+    times_s = recording.samples_s
     grid_s = np.arange(times_s[0], times_s[-1], 1.0 / RATE_HZ)
 
     def on_grid(table: Array) -> Array:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from gait_recordings import RATE_HZ, Array
@@ -15,6 +15,7 @@ from mine_loc_core.stamps import to_ns
 
 START_NS = 10**15
 STANDARD_GRAVITY_M_S2 = 9.80665
+Bout: TypeAlias = dict[str, Any]  # of walking, as mobgap's references describe it
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,12 @@ class Recording:
     active: list[tuple[float, float]] = field(default_factory=list)  # when any reference saw walking
     turn: tuple[float, float] | None = None
     counted: int | None = None  # by a device beside, where strikes are not marked
+    references: dict[str, list[Bout]] = field(default_factory=dict)  # by name
+
+    @property
+    def samples_s(self) -> Array:
+        """Stamps in s from START_NS, (n,)."""
+        return (self.stamps_ns - START_NS) * 1e-9
 
 
 def folder(name: str) -> Path:
@@ -101,9 +108,10 @@ def mobgap() -> Iterator[Recording]:
                     np.array([t for t in strikes if np.isfinite(t)]),
                     bouts=[(float(b["Start"]), float(b["End"]), float(b["Length"])) for b in bouts],
                     active=[(float(b["Start"]), float(b["End"])) for each in references.values() for b in each],
+                    references=references,
                 )
 
 
-def _bouts(standard: dict[str, Any]) -> list[dict[str, Any]]:
+def _bouts(standard: dict[str, Any]) -> list[Bout]:
     found = standard["MicroWB"]
     return [bout for bout in (found if isinstance(found, list | np.ndarray) else [found]) if isinstance(bout, dict)]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from gait_recordings import RATE_HZ, Array
-from pdr_recordings import START_NS, Recording
+from pdr_recordings import Recording
 from pdr_tracks import HALT_S, SEARCH_S, TOLERANCE_S, f1, inside, lags, offset_s, shipped_detector, spread, track
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
@@ -16,7 +16,7 @@ from mine_loc_pdr.step_detector import NetworkStepDetector, StepModel
 from mine_loc_pdr.step_kernel import Floats
 from mine_loc_pdr.steps import PeakStepDetector, StepThresholds
 
-THRESHOLDS = (0.3, 0.35, 0.4, 0.45, 0.5)  # of the network's probability
+THRESHOLDS = (0.15, 0.2, 0.25, 0.3, 0.35)  # of the network's probability, in rhythm
 ADAPTING_GRID = tuple(
     StepThresholds(start_peak_m_s2=start, peak_share=share, weak_peak_m_s2=weak)
     for start, share, weak in itertools.product((0.8, 1.0, 1.2), (0.1, 0.2, 0.3), (0.02, 0.04, 0.08, float("inf")))
@@ -31,7 +31,7 @@ Found = Sequence[Array]
 
 def peak_counter(recording: Recording) -> Array:
     """Peaks of the band-passed magnitude, at least 0.3 s apart; not causal."""
-    times_s = (recording.stamps_ns - START_NS) * 1e-9
+    times_s = recording.samples_s
     grid_s = np.arange(times_s[0], times_s[-1], 1.0 / RATE_HZ)
     magnitude = np.interp(grid_s, times_s, np.linalg.norm(recording.force_m_s2, axis=1))
     band = butter(2, [0.5, 3.0], "bandpass", fs=RATE_HZ, output="sos")
@@ -159,8 +159,7 @@ def _mobgap(recordings: Sequence[Recording], find: Callable[[Recording], Array])
         hits += len(lags(own, recording.strikes_s, TOLERANCE_S))
         total += len(own)
         false += int(np.sum(~inside(steps - late, recording.active, 1.0)))
-        samples_s = (recording.stamps_ns - START_NS) * 1e-9
-        rest_s += float(np.sum(~inside(samples_s, recording.active, 1.0))) / RATE_HZ
+        rest_s += float(np.sum(~inside(recording.samples_s, recording.active, 1.0))) / RATE_HZ
     marked = sum(len(r.strikes_s) for r in recordings)
     return {
         "step_f1": round(f1(hits, total, marked), 4),

@@ -25,12 +25,12 @@ def ride(rng: np.random.Generator, frames: int) -> Array:
     low_hz = rng.uniform(0.5, 4.0)
     high_hz = low_hz + rng.uniform(1.0, 10.0)
     motion = np.empty((frames, CHANNELS))
-    rms_m_s2 = _between(rng, 0.1, 2.5)
+    rms_m_s2 = between(rng, 0.1, 2.5)
     level = rng.uniform(0.1, 0.8)
     for channel, gain in enumerate((1.0, level, level)):
         motion[:, channel] = gain * rms_m_s2 * band_noise(rng, frames, low_hz, high_hz)
     for channel in (3, 4, 5):
-        motion[:, channel] = _between(rng, 0.01, 0.3) * band_noise(rng, frames, 0.3, high_hz)
+        motion[:, channel] = between(rng, 0.01, 0.3) * band_noise(rng, frames, 0.3, high_hz)
     bend_s = rng.uniform(4.0, 20.0)
     motion[:, 3] += rng.normal(0.0, 0.2) * np.sin(math.tau * _times_s(frames) / bend_s + rng.uniform(0.0, math.tau))
     return motion
@@ -40,7 +40,7 @@ def blows(rng: np.random.Generator, frames: int) -> Array:
     """Blows of a tool as the waist feels them, 1 to 15 m/s² for 20 to 70 ms, and the swing of the arm between them."""
     times_s = _times_s(frames)
     period_s, width_s = rng.uniform(0.4, 1.8), rng.uniform(0.008, 0.03)
-    strength_m_s2 = _between(rng, 1.0, 15.0)
+    strength_m_s2 = between(rng, 1.0, 15.0)
     axis = rng.standard_normal(3)
     axis /= np.linalg.norm(axis)
     into = strength_m_s2 * np.array(
@@ -84,7 +84,7 @@ def band_noise(rng: np.random.Generator, frames: int, low_hz: float, high_hz: fl
     return noise
 
 
-def _between(rng: np.random.Generator, low: float, high: float) -> float:
+def between(rng: np.random.Generator, low: float, high: float) -> float:
     """Drawn evenly in the logarithm."""
     return math.exp(rng.uniform(math.log(low), math.log(high)))
 

@@ -1,8 +1,8 @@
 """Training of the step network on walks whose heel strikes are marked, so that it also knows other people and devices.
 
 Crops of walks are stretched in time (slower and faster walkers), turned about the vertical (any yaw of the mounting),
-mirrored, scaled, given noise and offsets. Among them are drawn motions that
-hold no step (`shaking.py`). Times are seconds from the first frame's end; draws come from the seed alone.
+mirrored, scaled, given noise and offsets; some ring (`ringing.py`). Among them are drawn motions that hold no step
+(`shaking.py`). Times are seconds from the first frame's end; draws come from the seed alone.
 """
 
 import math
@@ -15,6 +15,7 @@ from torch import nn
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_pdr.marked_motion import MarkedMotion
+from mine_loc_pdr.ringing import ringing
 from mine_loc_pdr.shaking import shaking
 from mine_loc_pdr.step_detector import LOOKAHEAD_S
 from mine_loc_pdr.step_frames import FRAME_NS
@@ -34,6 +35,7 @@ _STRIKE_WEIGHT = 2.0  # what a strike's frame weighs more than another
 _STRETCH = (-0.15, 0.25)  # logarithm of the time a walk takes
 _UNSEEN = 40  # frames at the start of a crop that are not judged: what was before them is not known
 _SHAKING_SHARE = 0.25
+_RINGING_SHARE = 0.3  # of the walks
 _GAIN_LOG_SD = 0.3
 _NOISE = np.array([0.05, 0.05, 0.05, 0.01, 0.01, 0.01])  # m/s², rad/s
 _OFFSET_M_S2 = 0.1
@@ -83,13 +85,15 @@ def _crop(rng: np.random.Generator, walk: MarkedMotion) -> tuple[Array, Array, A
     """A piece of a walk, as if the same way took `slower` times as long, so that accelerations go with its square."""
     slower = math.exp(rng.uniform(*_STRETCH))
     first = rng.uniform(-30.0, max(1.0, len(walk.frames) - 0.7 * _FRAMES / slower))
-    places = first + np.arange(_FRAMES) / slower
-    frames = np.column_stack([np.interp(places, np.arange(len(walk.frames)), column) for column in walk.frames.T])
+    places, rows = first + np.arange(_FRAMES) / slower, np.arange(len(walk.frames))
+    frames: Array = np.column_stack([np.interp(places, rows, column) for column in walk.frames.T])
     frames[:, :3] /= slower**2
     frames[:, 3:] /= slower
-    times_s = np.arange(_FRAMES) * _FRAME_S
-    strikes_s = (walk.strikes_s - first * _FRAME_S) * slower + LOOKAHEAD_S
-    near = strikes_s[(strikes_s > -1.0) & (strikes_s < times_s[-1] + 1.0)]
+    times_s = np.arange(_FRAMES, dtype=np.float64) * _FRAME_S
+    strikes_s: Array = (walk.strikes_s - first * _FRAME_S) * slower + LOOKAHEAD_S
+    near: Array = strikes_s[(strikes_s > -1.0) & (strikes_s < times_s[-1] + 1.0)]
+    if rng.random() < _RINGING_SHARE:
+        frames[:, :3] += ringing(rng, times_s, near - LOOKAHEAD_S)
     target = np.exp(-0.5 * ((times_s[:, None] - near) / _STRIKE_SD_S) ** 2).max(axis=1, initial=0.0)
     return frames, target, (times_s < (walk.end_s - first * _FRAME_S) * slower + LOOKAHEAD_S).astype(float)
 

@@ -25,6 +25,7 @@ MEDIAN_WINDOW_NS = 75 * NS_PER_MS
 MEAN_WINDOW_NS = 120 * NS_PER_MS
 SHORTEST_INTERVAL_NS = 300 * NS_PER_MS
 LONGEST_INTERVAL_NS = 1500 * NS_PER_MS  # what comes later starts a new walk
+SLOWEST_STEP_S = 0.75  # what takes longer holds a pause: of 0.6 to 1 s the best for lengths on ipol_gait_lowerback
 # The heel strikes this long after the smoothed acceleration rises through zero: median over ipol_gait_lowerback.
 STRIKE_AFTER_RISE_NS = 65 * NS_PER_MS
 # Half waves of the slowest walk; what takes longer is no step, and would be reported late.
@@ -36,8 +37,8 @@ _OVERDUE_NS = 260 * NS_PER_MS
 _OVERDUE_PEAK_SHARE = 0.5  # of the usual peak, at least
 _OVERDUE_FALL_SHARE = 0.6  # of its own peak, at most
 _BASELINE_TIME_CONSTANT_S = 2.0
-_ADAPTATION = 0.3  # share of the newest step in what is held for usual
-_FIRST_INTERVAL_S = 0.55  # until a walk has shown its own
+ADAPTATION = 0.3  # share of the newest step in what is held for usual
+FIRST_INTERVAL_S = 0.55  # until a walk has shown its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,7 @@ class PeakStepDetector:
         self._last_step_ns: int | None = None
         self._was_weak = False
         self._usual_peak_m_s2 = 0.0
-        self._usual_interval_s = _FIRST_INTERVAL_S
+        self._usual_interval_s = FIRST_INTERVAL_S
 
     def push(self, stamp_ns: int, motion: Motion) -> Step | None:
         """See StepDetector."""
@@ -199,8 +200,8 @@ class PeakStepDetector:
             return None
         self._was_weak = not strong
         if strong:
-            self._usual_peak_m_s2 += _ADAPTATION * (self._peak_m_s2 - self._usual_peak_m_s2)
-            self._usual_interval_s += _ADAPTATION * (interval_s - self._usual_interval_s)
+            self._usual_peak_m_s2 += ADAPTATION * (self._peak_m_s2 - self._usual_peak_m_s2)
+            self._usual_interval_s += ADAPTATION * (interval_s - self._usual_interval_s)
         return self._step(stamp_ns, interval_s)
 
     def _drawn_up(self, interval_s: float) -> bool:
@@ -210,7 +211,7 @@ class PeakStepDetector:
         return in_time and not self._was_weak and self._peak_m_s2 >= self._thresholds.weak_peak_m_s2
 
     def _first(self, stamp_ns: int) -> Step:
-        self._was_weak, self._usual_peak_m_s2, self._usual_interval_s = False, self._peak_m_s2, _FIRST_INTERVAL_S
+        self._was_weak, self._usual_peak_m_s2, self._usual_interval_s = False, self._peak_m_s2, FIRST_INTERVAL_S
         return self._step(stamp_ns, None)
 
     def _step(self, stamp_ns: int, interval_s: float | None) -> Step:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from mine_loc_core.people import Person
+from mine_loc_pdr.steps import SLOWEST_STEP_S
 
 TYPICAL_HEIGHT_M = 1.75
 TYPICAL_FREQUENCY_HZ = 1.79
@@ -80,8 +81,8 @@ class PendulumStrideModel:
     def length_m(self, frequency_hz: float | None, swing_m_s2: float) -> float:
         """See StepLengthModel."""
         rise = math.sqrt(self.height_m * swing_m_s2)
-        length_m = PENDULUM_FACTOR * rise / (frequency_hz or TYPICAL_FREQUENCY_HZ)
-        return min(length_m, LONGEST_STEP_SHARE * self.height_m) * self.scale
+        lasts_s = min(1.0 / (frequency_hz or TYPICAL_FREQUENCY_HZ), SLOWEST_STEP_S)
+        return min(PENDULUM_FACTOR * rise * lasts_s, LONGEST_STEP_SHARE * self.height_m) * self.scale
 
     def scaled(self, scale: float, variance: float) -> "PendulumStrideModel":
         """The same with another K."""

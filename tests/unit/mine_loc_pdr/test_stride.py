@@ -42,6 +42,11 @@ def test_the_pendulum_steps_further_with_more_swing_height_and_time():
     assert PendulumStrideModel(1.75, scale=1.1).length_m(1.79, 3.5) == pytest.approx(1.1 * usual)
 
 
+def test_a_pause_within_a_step_makes_it_no_longer():
+    model = PendulumStrideModel(1.75)
+    assert model.length_m(1.0, 3.5) == model.length_m(0.8, 3.5) > model.length_m(1.4, 3.5)
+
+
 def test_no_knock_makes_a_step_longer_than_people_are_able_to():
     assert PendulumStrideModel(1.75).length_m(1.79, 2000.0) == PendulumStrideModel(1.75).length_m(0.7, 50.0)
     assert PendulumStrideModel(1.75).length_m(1.79, 2000.0) == pytest.approx(0.6 * 1.75)

@@ -18,8 +18,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress
 
-THRESHOLD = 0.4
-"""The probability from which a maximum is a step: of those that the bench tries, what most people left out chose."""
+THRESHOLD = 0.25
+"""The probability from which a maximum in rhythm is a step: of those that the bench tries, what most left out chose."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
