@@ -31,7 +31,7 @@ RESULTS = Path(__file__).parent / "results" / "live.json"
 WARM_UP_S = 8.0
 ONE_PERSON_S, ONE_PERSON_RATE_HZ, ONE_PERSON_RUNS = 28.0, 10.0, 5
 FLEET_S, FLEET_RATE_HZ = 28.0, 2.0
-FLEET_FROM, STEPS_FROM = 8, 25
+FLEET_FROM, STEPS_FROM = 16, 50
 _CONSOLE = Console()
 
 
