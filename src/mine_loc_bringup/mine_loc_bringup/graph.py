@@ -64,13 +64,17 @@ class NodeProcess:
         return f"{self.namespace}/{self.node_name}".lstrip("/")
 
     @property
-    def command(self) -> list[str]:
-        """What to execute where there is no ROS launch. Values come after the file, so they win over it."""
-        words = [sys.executable, "-m", self.module, "--ros-args"]
-        words += ["-r", f"__node:={self.node_name}", "-r", f"__ns:={self.namespace}"]
+    def ros_arguments(self) -> list[str]:
+        """Name, namespace and parameters. Values come after the file, so they win over it."""
+        words = ["--ros-args", "-r", f"__node:={self.node_name}", "-r", f"__ns:={self.namespace}"]
         if self.parameter_file:
             words += ["--params-file", str(self.parameter_file)]
         return words + parameter_words(self.parameters)
+
+    @property
+    def command(self) -> list[str]:
+        """What to execute where there is no ROS launch."""
+        return [sys.executable, "-m", self.module, *self.ros_arguments]
 
 
 def parameter_words(parameters: Mapping[str, Any]) -> list[str]:

@@ -23,7 +23,6 @@ from mine_loc_core.people import People, PeopleFile
 from mine_loc_core.site import load_site
 
 _POLL_S = 1.0
-_PYTHON_WORDS = 3  # of a node's command; the rest are its ROS arguments
 
 
 class Together:
@@ -48,7 +47,7 @@ class Together:
 
     def _start(self, name: str, node: NodeProcess) -> None:
         try:
-            host = RosHost(node_class(node.module), node.command[_PYTHON_WORDS:])
+            host = RosHost(node_class(node.module), node.ros_arguments)
         except ConfigurationError as error:
             print(error, file=sys.stderr)
             return
