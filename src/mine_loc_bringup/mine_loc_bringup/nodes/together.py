@@ -3,7 +3,7 @@
     python -m mine_loc_bringup.nodes.together n100_driver --site FOLDER [--sim-time] [--only NODE …]
 
 Each driver of an N100 is woken 100 times a second. In a process of its own it finds the caches cold and takes
-80 MB; together they take 40 % of the CPU (docs/live.md).
+160 MB; together they take a fifth of the CPU (docs/live.md).
 """
 
 import argparse
