@@ -30,8 +30,8 @@ from rich.table import Table
 RESULTS = Path(__file__).parent / "results" / "live.json"
 WARM_UP_S = 8.0
 ONE_PERSON_S, ONE_PERSON_RATE_HZ, ONE_PERSON_RUNS = 28.0, 10.0, 3
-FLEET_S, FLEET_RATE_HZ = 28.0, 2.0
-FLEET_FROM, STEPS_FROM = 16, 100
+FLEET_S, FLEET_RATE_HZ = 24.0, 2.0
+FLEET_FROM, STEPS_FROM = 25, 100
 _CONSOLE = Console()
 
 

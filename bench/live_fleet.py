@@ -6,7 +6,7 @@ from typing import Any
 from mine_loc_sim.scene import MOST_PEOPLE
 
 LONGEST_P99_MS = 100.0
-_NARROW_SHARE = 0.15
+_NARROW_SHARE = 0.25
 """The search ends when the fleet is known to so much of itself."""
 
 Figures = Mapping[str, Any]
