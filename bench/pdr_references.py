@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from gait_recordings import Array
 from pdr_recordings import Bout, Recording
-from pdr_tracks import TOLERANCE_S, Track, f1, inside, lags, offset_s, spread
+from pdr_tracks import TOLERANCE_S, Track, f1, false_steps, inside, lags, offset_s, spread
 
 BORDER_S = 0.05  # contacts on the border of a bout belong to it
 
@@ -82,11 +82,7 @@ def _all_contacts_s(bout: Bout) -> Array:
 
 
 def _false_per_min(recordings: Sequence[Recording], times_s: Sequence[Array], reference: str) -> float:
-    """Contacts that lie 1 s or more outside the reference's bouts, a minute of that time."""
-    false, rest_s = 0, 0.0
-    for recording, own in zip(recordings, times_s, strict=True):
-        bouts = spans(recording.references[reference])
-        samples_s = recording.samples_s
-        false += int(np.sum(~inside(own, bouts, 1.0)))
-        rest_s += float(np.mean(~inside(samples_s, bouts, 1.0))) * float(samples_s[-1] - samples_s[0])
+    """Of the contacts, by the bouts of the reference."""
+    found = [false_steps(r, own, spans(r.references[reference])) for r, own in zip(recordings, times_s, strict=True)]
+    false, rest_s = map(sum, zip(*found, strict=True))
     return round(60.0 * false / rest_s, 2)

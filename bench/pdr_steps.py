@@ -9,7 +9,19 @@ from typing import Any
 import numpy as np
 from gait_recordings import RATE_HZ, Array
 from pdr_recordings import Recording
-from pdr_tracks import HALT_S, SEARCH_S, TOLERANCE_S, f1, inside, lags, offset_s, shipped_detector, spread, track
+from pdr_tracks import (
+    HALT_S,
+    SEARCH_S,
+    TOLERANCE_S,
+    f1,
+    false_steps,
+    inside,
+    lags,
+    offset_s,
+    shipped_detector,
+    spread,
+    track,
+)
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from mine_loc_pdr.step_detector import NetworkStepDetector, StepModel
@@ -158,8 +170,8 @@ def _mobgap(recordings: Sequence[Recording], find: Callable[[Recording], Array])
         own = (steps - late)[inside(steps - late, recording.bouts, SEARCH_S)]
         hits += len(lags(own, recording.strikes_s, TOLERANCE_S))
         total += len(own)
-        false += int(np.sum(~inside(steps - late, recording.active, 1.0)))
-        rest_s += float(np.sum(~inside(recording.samples_s, recording.active, 1.0))) / RATE_HZ
+        false_here, rest_here_s = false_steps(recording, steps - late, recording.active)
+        false, rest_s = false + false_here, rest_s + rest_here_s
     marked = sum(len(r.strikes_s) for r in recordings)
     return {
         "step_f1": round(f1(hits, total, marked), 4),

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gait_recordings import Array
+from gait_recordings import RATE_HZ, Array
 from pdr_recordings import START_NS, Recording
 
 from mine_loc_core.stamps import to_s
@@ -20,6 +20,7 @@ TOLERANCE_S = 0.15
 SEARCH_S = 0.3  # in which lags are looked for, to find the one constant offset
 HALT_S = 0.5  # the last strike of a trial falls on its marked end
 UNKNOWN_HEIGHT_M = 1.70
+_FALSE_FROM_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +96,12 @@ def inside(times_s: Array, spans: Sequence[tuple[float, ...]], margin_s: float) 
     for begin, end, *_ in spans:
         mask |= (times_s >= begin - margin_s) & (times_s <= end + margin_s)
     return mask
+
+
+def false_steps(recording: Recording, steps_s: Array, walking: Sequence[tuple[float, ...]]) -> tuple[int, float]:
+    """Steps that lie 1 s or more outside the spans of walking, and the seconds recorded there."""
+    at_rest = ~inside(recording.samples_s, walking, _FALSE_FROM_S)
+    return int(np.sum(~inside(steps_s, walking, _FALSE_FROM_S))), float(np.sum(at_rest)) / RATE_HZ
 
 
 def spread(values: Sequence[float] | Array, digits: int = 3) -> dict[str, float]:

@@ -70,6 +70,7 @@ def test_a_new_person_is_positioned_and_the_others_go_on_undisturbed(graph):
 
     write_people(site, people)
     observer.wait_for(lambda: "[n100_driver] newcomer/n100_driver stopped" in graph.up.output)
+    assert "walker/n100_driver stopped" not in graph.up.output
 
 
 def test_a_bad_edit_is_reported_and_changes_nothing(graph):

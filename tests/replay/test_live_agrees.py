@@ -10,6 +10,7 @@ from graph.domains import lent_domain
 from graph.observer import Observer
 from graph.processes import running, up_command
 from mine_loc_interfaces.msg import PersonPoseArray
+from replay.fused_places import places, places_of
 
 from mine_loc_bringup.bag_messages import open_bag
 from mine_loc_bringup.message_types import workspace_types
@@ -26,28 +27,14 @@ LEAST_SHARE = 0.98
 """Of the stamps: under load a step may come a coast's period later, and then that one pose is another."""
 
 
-def places(array) -> dict[tuple[str, int], tuple[float, float]]:
-    """Person and stamp [ns] → x, y [m]."""
-    return {
-        (item.person, item.stamp.sec * 10**9 + item.stamp.nanosec): (
-            item.pose.pose.position.x,
-            item.pose.pose.position.y,
-        )
-        for item in array.people
-    }
-
-
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(("scene", "rate"), [("damaged_lines", "3"), ("judged_links", "0.4")])
 def test_live_and_offline_agree_within_a_centimetre(scene, rate, tmp_path):
     """Slowly where a classifier works: a judgement that misses its round by load is another input."""
     bag = FOLDER / scene / "bag"
     replay_offline(bag, tmp_path / "out")
-    types, offline = workspace_types(), {}
-    with open_bag(tmp_path / "out") as found:
-        for message in found.read({"/fused/poses"}):
-            offline |= places(types.deserialize_cdr(message.data, message.type_name))
-        rounds = {to_stamp_ns(types.deserialize_cdr(each.data, each.type_name).header.stamp) for each in read(bag)}
+    types, offline = workspace_types(), places_of(tmp_path / "out")
+    rounds = {to_stamp_ns(types.deserialize_cdr(each.data, each.type_name).header.stamp) for each in read(bag)}
     nodes = ("los_classifier", *NODES) if scene == "judged_links" else NODES
     live = {}
     with lent_domain() as domain:

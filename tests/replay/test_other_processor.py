@@ -8,9 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from replay.fused_places import places_of
 
-from mine_loc_bringup.bag_messages import open_bag
-from mine_loc_bringup.message_types import workspace_types
 from mine_loc_bringup.offline_run import replay_offline
 
 FOLDER = Path(__file__).parent
@@ -25,17 +24,6 @@ PLAIN = {
 }
 
 
-def poses(bag: Path) -> dict[tuple[str, int, int], tuple[float, float, float]]:
-    """Person and stamp → x, y, z [m]."""
-    types, found = workspace_types(), {}
-    with open_bag(bag) as opened:
-        for message in opened.read({"/fused/poses"}):
-            for item in types.deserialize_cdr(message.data, message.type_name).people:
-                place = item.pose.pose.position
-                found[item.person, item.stamp.sec, item.stamp.nanosec] = (place.x, place.y, place.z)
-    return found
-
-
 @pytest.mark.timeout(180)
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the instructions left out are those of x86-64")
 @pytest.mark.parametrize("scene", ["walk", "judged_links"])
@@ -46,7 +34,7 @@ def test_poses_agree_within_a_micrometre(scene, tmp_path, tmp_path_factory):
     words = [sys.executable, "-m", "mine_loc_bringup.main", "replay", str(bag), "--out", str(tmp_path / "plain")]
     environment = os.environ | PLAIN | {"NUMBA_CACHE_DIR": str(cache)}
     subprocess.run(words, env=environment, check=True, timeout=150.0, capture_output=True)
-    ours, plain = poses(tmp_path / "ours"), poses(tmp_path / "plain")
+    ours, plain = places_of(tmp_path / "ours"), places_of(tmp_path / "plain")
     assert len(ours) > 100
     assert ours.keys() == plain.keys()
     assert max(math.dist(ours[key], plain[key]) for key in ours) < MOST_APART_M

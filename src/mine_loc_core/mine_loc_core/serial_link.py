@@ -107,12 +107,11 @@ class SerialLink:
     def _run(self) -> None:
         retry_s = _FIRST_RETRY_S
         while not self._stopped:
-            self._woken.clear()
             if self._open():
                 retry_s = _FIRST_RETRY_S
                 self._read_until_it_fails()
                 self._close()
-            self._woken.clear()
+                self._woken.clear()
             if not self._stopped:
                 self._woken.wait(retry_s * random.uniform(0.5, 1.0))  # noqa: S311 jitter, not a secret
             retry_s = min(2 * retry_s, _LAST_RETRY_S)
@@ -146,7 +145,7 @@ class SerialLink:
         except _FAILURES as error:
             self._error = str(error)
             return
-        while not (self._woken.is_set() or self._stopped):
+        while not self._woken.is_set():
             left_s = self._last_heard + self._silence_s - time.monotonic()
             if left_s <= 0.0:
                 self._error = f"silent for {self._silence_s:g} s"
