@@ -1,6 +1,5 @@
 """The recorder beside nodes of other namespaces: what it finds, what it keeps of it, and what it says."""
 
-import resource
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -135,35 +134,6 @@ def test_unknown_topics_and_types_are_named_once_each(observer, domain, tmp_path
     assert said.count("nowhere: nobody publishes a topic of this name") >= 1
     assert said.count("/both: recorded as std_msgs/msg/Int32 alone, and std_msgs/msg/String is published too") == 1
     assert set(messages(tmp_path / "bag")) == {"/known", "/both"}
-
-
-@pytest.mark.parametrize("storage", list(Storage))
-def test_a_disk_that_takes_no_more_is_told_and_recording_goes_on_when_there_is_room(
-    observer, domain, tmp_path, storage
-):
-    with recorder(tmp_path, domain, topics="beat", storage=storage.value) as run:
-        scene = Scene(observer, run)
-        beat = scene.publisher(String, "/beat", EVENTS)
-        sent = 0
-
-        def level() -> int | None:
-            nonlocal sent
-            beat.publish(String(data=f"{sent} {'x' * 5000}"))
-            sent += 1
-            return observer.level(STATUS)
-
-        scene.wait_for(lambda: level() == 0 and observer.value(STATUS, "messages") > 20, "a good beginning")
-        resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (100_000, resource.RLIM_INFINITY))
-        scene.wait_for(lambda: level() == 2, "an error")
-        scene.wait_for(lambda: "what was written is safe" in run.output, "the line of it")
-        resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-        scene.wait_for(lambda: level() == 0, "room again")
-        scene.wait_for(lambda: observer.value(STATUS, "messages") == sent, "all of it")
-        scene.end()
-    assert run.output.count("what was written is safe") == 1
-    assert run.output.count("recording goes on; 0 messages were dropped so far") == 1
-    numbers = [int(item.data.split()[0]) for item in messages(tmp_path / "bag")["/beat"]]
-    assert numbers == list(range(sent))
 
 
 def test_a_bag_that_is_there_already_is_refused_in_one_line(domain, tmp_path):
