@@ -94,6 +94,7 @@ class Killed:
     acknowledged: int
     sent_ns: list[int]
     killed_ns: int
+    output: str
     stored_ns: set[int] = field(default_factory=set)
 
     def problems(self) -> list[str]:
@@ -138,7 +139,7 @@ class Kills:
             store.process.kill()
             killed_ns = time.time_ns()
             store.ends()
-        return Killed(withheld, acknowledged, sent_ns, killed_ns)
+        return Killed(withheld, acknowledged, sent_ns, killed_ns, store.output)
 
     def recover(self) -> None:
         """Start the store until its spool is empty, and stop it."""
@@ -197,7 +198,9 @@ def main() -> int:
             lost_s = (killed.killed_ns - max(killed.stored_ns, default=0)) / 1e9
             rows = f"{len(killed.sent_ns) * PEOPLE} sent, {killed.acknowledged} known acknowledged"
             there = f"{len(killed.stored_ns) * PEOPLE} there, last {lost_s:.2f} s before the kill"
-            print(f"{number} {'withheld' * killed.withheld}: {rows}, {there} {'; '.join(problems)}", flush=True)
+            print(f"{number} {'withheld' * killed.withheld}: {rows}, {there}", flush=True)
+            if problems:
+                print("; ".join(problems), killed.output, sep="\n", flush=True)
     print(f"{len(runs)} kills, {wrong} with something wrong")
     return 1 if wrong else 0
 

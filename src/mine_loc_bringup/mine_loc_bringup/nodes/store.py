@@ -1,5 +1,6 @@
 """Who was where: poses, regions, zone events, alarms and summaries of ranges into a database."""
 
+import contextlib
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,6 +18,7 @@ from mine_loc_bringup.store.keeper import Keeper
 from mine_loc_bringup.store.parameters import StoreParameters
 from mine_loc_bringup.store.retention import RetentionRule, check_rule, retain
 from mine_loc_bringup.store.spool import Spool
+from mine_loc_bringup.store.time_limit import TimeLimited
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.node_base import NodeBase
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
@@ -25,6 +27,7 @@ from mine_loc_core.site import load_site
 from mine_loc_core.stamps import NS_PER_S, to_stamp_ns
 
 _BATCH_ROWS = 5000
+_ANSWER_S = 0.3  # with flush_s, less than a second until rows are acknowledged
 _RETAIN_NS = 60 * NS_PER_S
 
 
@@ -61,8 +64,9 @@ class StoreNode(NodeBase):
         self._engine = open_engine(self._url, writing=True)
         self._database = DatabaseWriter(self._engine)
         spool = Spool(self._spool_file, taken.spool_mb * 1_000_000)
-        self._keeper = Keeper(self._database, spool, self._watch.arrange, taken.memory_rows, _BATCH_ROWS)
-        self._worker = self.host.make_worker(lambda: None, self.guarded(self._work, "write"))
+        self._limited = TimeLimited(self._database, _ANSWER_S)
+        self._keeper = Keeper(self._limited, spool, self._watch.arrange, taken.memory_rows, _BATCH_ROWS)
+        self._worker = self.host.make_worker(self._prepare, self.guarded(self._work, "write"))
 
     def deactivate(self) -> None:
         """Write what waits."""
@@ -113,6 +117,10 @@ class StoreNode(NodeBase):
     def _wake(self) -> None:
         self._worker.wake()
 
+    def _prepare(self) -> None:
+        with contextlib.suppress(SQLAlchemyError, CommandError, OSError):  # the first batch tells
+            self._database.prepare()
+
     def _work(self) -> None:
         self._keeper.flush(self.now_ns(), self.steady_ns())
         trouble = self._trouble()
@@ -121,8 +129,8 @@ class StoreNode(NodeBase):
         elif self._told and not trouble:
             self.host.warn(f"{shown(self._url)}: takes rows again, none of those acknowledged is missing")
         self._told = trouble
-        if not trouble and self.steady_ns() >= self._retain_from_ns:
-            self._retain()
+        if not (trouble or self._limited.busy) and self.steady_ns() >= self._retain_from_ns:
+            self._limited.begin(self._retain)
 
     def _trouble(self) -> str:
         keeper = self._keeper
