@@ -72,7 +72,7 @@ def _watch(pipe: Connection, *, stages: bool) -> None:
     node = rclpy.create_node("bench_watch")
     topics: dict[str, type] = {"uwb/ranges": msg.UwbRangeArray, "fused/poses": msg.PersonPoseArray}
     if stages:
-        topics |= {"uwb/link_state": msg.LinkState, "uwb/pose": msg.UwbPose, "sync/epochs": msg.Epoch}
+        topics |= {"uwb/link_state": msg.LinkStateArray, "uwb/pose": msg.UwbPose, "sync/epochs": msg.Epoch}
     received: list[tuple[str, int, bytes]] = []
 
     def listen(topic: str, kind: type) -> None:
@@ -122,9 +122,9 @@ def _seen(received: list[tuple[str, int, Any]]) -> Seen:
                 poses.setdefault(person.tag_id, []).append((stamp_ns, stamp_ns - since_ns, at_ns))
             continue
         stamp_ns = to_stamp_ns(message.header.stamp)
-        if topic == "sync/epochs":
-            for array in message.ranges:
-                came[array.tag_id, stamp_ns] = at_ns
+        if topic in {"sync/epochs", "uwb/link_state"}:
+            for each in message.ranges if topic == "sync/epochs" else message.states:
+                came[each.tag_id, stamp_ns] = at_ns
             continue
         if topic == "uwb/ranges":
             stamps[message.tag_id, message.seq] = stamp_ns

@@ -49,7 +49,10 @@ _WAITING = (Kind.RANGES, *_COMPANIONS, Kind.VELOCITY_CHANGE)
 
 @dataclass(frozen=True, slots=True)
 class SyncInput:
-    """One input: `source` and `seq` identify it, `links` is the number of link states a round may get."""
+    """One input: `source` and `seq` identify it.
+
+    `links` is the number of link states a round may get; `size` is how much of the capacity of its kind it takes.
+    """
 
     person: str
     kind: Kind
@@ -58,6 +61,7 @@ class SyncInput:
     stamp_ns: int
     payload: Any
     links: int = 0
+    size: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +81,7 @@ class _Open:
     deadline_ns: int
     links: int
     inputs: dict[Kind, list[Any]] = field(default_factory=dict)
+    sizes: Counter[Kind] = field(default_factory=Counter)
 
 
 @dataclass(slots=True)
@@ -128,6 +133,7 @@ class Synchroniser:
             self._waiting[item.person] = None
         epoch.links = max(epoch.links, item.links)
         epoch.inputs.setdefault(item.kind, []).append(item.payload)
+        epoch.sizes[item.kind] += item.size
         return self._emit(item.person, person, now_ns), reason
 
     def poll(self, now_ns: int) -> list[Epoch]:
@@ -167,7 +173,7 @@ class Synchroniser:
         if forgotten or (person.last_stamp_ns is not None and item.stamp_ns < person.last_stamp_ns - self._history_ns):
             return Reason.STALE
         epoch = person.open.get(item.stamp_ns)
-        if epoch is not None and len(epoch.inputs.get(item.kind, ())) >= CAPACITY[item.kind]:
+        if item.size + (epoch.sizes[item.kind] if epoch is not None else 0) > CAPACITY[item.kind]:
             return Reason.OVERFLOW
         self._remember(person, item, identity)
         return Reason.ACCEPTED
@@ -207,5 +213,5 @@ class Synchroniser:
             return False
         heard_ns = person.link_state_heard_ns
         if epoch.links and heard_ns is not None and now_ns - heard_ns < _LINK_STATES_EXPECTED_NS:
-            return len(epoch.inputs.get(Kind.LINK_STATE, ())) >= epoch.links
+            return epoch.sizes[Kind.LINK_STATE] >= epoch.links
         return Kind.UWB_POSE in epoch.inputs

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mine_loc_interfaces.msg import CirFrame, LinkState
+from mine_loc_interfaces.msg import CirFrameArray, LinkState
 from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader, ReaderError
 
@@ -31,7 +31,7 @@ def read_bag(path: Path) -> LabelledFrames:
     labels = _labels(path)
     kept, classes = [], []
     widths = set()
-    for message in _messages(path, _CIR, CirFrame):
+    for message in (frame for array in _messages(path, _CIR, CirFrameArray) for frame in array.frames):
         known = labels.get((message.tag_id, message.anchor_id))
         found = _nearest(known, to_stamp_ns(message.header.stamp))
         if found and len(kept) < _MOST_FRAMES:

@@ -16,7 +16,7 @@ from mine_loc_core.device_clock import DeviceStamp, SyncState
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_pdr.nodes.messages import Covariances, to_header, to_imu, to_magnetic_field
 from mine_loc_pdr.parameters import N100DriverParameters
-from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array
+from mine_loc_uwb.nodes.messages import to_cir_array, to_range_array
 from mine_loc_uwb.parameters import Dwm1000DriverParameters
 
 _FRAME = "uwb_tag_link"
@@ -67,7 +67,7 @@ def _rounds(recording: Recording) -> Iterator[Entry]:
 
 def _accumulators(recording: Recording) -> Iterator[Entry]:
     for at, window in recording.accumulators:
-        yield at.arrival_ns, "uwb/cir", to_cir_frame(window, _stamp(at), _FRAME)
+        yield at.arrival_ns, "uwb/cir", to_cir_array([window], _stamp(at), _FRAME)
 
 
 def _stamp(at: Instant) -> DeviceStamp:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from mine_loc_interfaces.msg import CirFrame, TdoaArray, UwbRangeArray
+from mine_loc_interfaces.msg import CirFrameArray, TdoaArray, UwbRangeArray
 
 from mine_loc_bringup.bag_writer import BagWriter
 from mine_loc_bringup.nodes.cdr import to_cdr
@@ -33,13 +33,14 @@ from mine_loc_sim.walker import TrueStep
 from mine_loc_uwb.device_stamps import DeviceStamps
 from mine_loc_uwb.nodes.line_messages import LineIds, stamped_message
 from mine_loc_uwb.parameters import Dwm1000DriverParameters
+from mine_loc_uwb.window_gatherer import WindowGatherer
 from mine_loc_uwb.wire.detect import make_decoder
 
 START_NS = 1_700_000_000 * NS_PER_S
 """ROS time of the scene's beginning, always the same so that the same seed gives the same bag."""
 
 _TRUTH_PERIOD_NS = NS_PER_S // 50
-_TOPICS = {UwbRangeArray: "uwb/ranges", TdoaArray: "uwb/tdoa", CirFrame: "uwb/cir"}
+_TOPICS = {UwbRangeArray: "uwb/ranges", TdoaArray: "uwb/tdoa", CirFrameArray: "uwb/cir"}
 Entry = tuple[int, str, Any]
 
 
@@ -78,6 +79,7 @@ class _Driver(Protocol):
 class _UwbDriver:
     def __init__(self, receiver: UwbReceiver) -> None:
         self._decoder = make_decoder(wire_format(receiver))
+        self._gatherer = WindowGatherer()
         self._parameters = Dwm1000DriverParameters()
         self._stamps = DeviceStamps(latency_ns=0, trust_device_clock=self._parameters.trust_device_clock)
         self._ids = LineIds(receiver.tag_id, receiver.anchor_id or 0)
@@ -86,13 +88,15 @@ class _UwbDriver:
         at_ns, what = arrival
         if isinstance(what, Cable):
             self._decoder.reset()
+            self._gatherer.reset()
             self._stamps.forget()
             return
         sd_m = self._parameters.range_sd_m
         for found in self._decoder.feed(what):
-            message = stamped_message(found, self._decoder, self._stamps, START_NS + at_ns, self._ids, sd_m)
-            if message is not None:
-                yield at_ns, _TOPICS[type(message)], message
+            for gathered in self._gatherer.take(found):
+                message = stamped_message(gathered, self._decoder, self._stamps, START_NS + at_ns, self._ids, sd_m)
+                if message is not None:
+                    yield at_ns, _TOPICS[type(message)], message
 
 
 class _MonitorDriver:

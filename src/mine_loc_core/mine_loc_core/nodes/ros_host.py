@@ -34,8 +34,6 @@ _WATCH_PERIOD_S = 0.2
 _JUMP_NS = 500_000_000
 _SPIN_S = 0.2
 _NEVER_S = 3600.0  # a timer needs a period
-_GATHER_S = 2e-4
-"""So long after a worker was woken what belongs together is there; one batch of four costs a third of four batches."""
 
 
 class RosHost(LifecycleNode):
@@ -234,7 +232,6 @@ class _WorkerThread(threading.Thread):
             self._woken.wait()
             if self._ended:
                 return
-            time.sleep(_GATHER_S)
             self._woken.clear()
             self._work()
 

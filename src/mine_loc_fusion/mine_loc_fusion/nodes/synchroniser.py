@@ -41,14 +41,9 @@ class SynchroniserNode(NodeBase):
         self._deadline = self.alarm(self._poll)
         self.every(_PEOPLE_PERIOD_S, self._reload_people)
         self.subscribe(msg.UwbRangeArray, "uwb/ranges", self._on_ranges, EVENTS)
-        self.subscribe(msg.TdoaArray, "uwb/tdoa", lambda m: self._on_tag(Kind.TDOA, m, m.seq), EVENTS)
+        self.subscribe(msg.TdoaArray, "uwb/tdoa", lambda m: self._on_tag(Kind.TDOA, m, m.seq, m.tag_id), EVENTS)
         self.subscribe(msg.UwbPose, "uwb/pose", self._on_pose, EVENTS)
-        self.subscribe(
-            msg.LinkState,
-            "uwb/link_state",
-            lambda m: self._on_tag(Kind.LINK_STATE, m, m.range_seq, m.anchor_id),
-            EVENTS,
-        )
+        self.subscribe(msg.LinkStateArray, "uwb/link_state", self._on_link_states, EVENTS)
         self.subscribe(msg.Step, "pdr/steps", lambda m: self._on_person(Kind.STEP, m, m.count), EVENTS)
         self.subscribe(msg.LandmarkFix, "pdr/landmark_fix", lambda m: self._on_person(Kind.LANDMARK, m, 0), EVENTS)
         self.subscribe(
@@ -100,28 +95,35 @@ class SynchroniserNode(NodeBase):
             self._unknown_tags.clear()
 
     def _on_ranges(self, message: msg.UwbRangeArray) -> None:
-        self._on_tag(Kind.RANGES, message, message.seq, message.reporter_id, links=links_received(message))
+        self._on_tag(
+            Kind.RANGES, message, message.seq, message.tag_id, message.reporter_id, links=links_received(message)
+        )
+
+    def _on_link_states(self, array: msg.LinkStateArray) -> None:
+        if array.states:
+            first = array.states[0]  # all are of its tag and round
+            self._on_tag(Kind.LINK_STATE, array, first.range_seq, first.tag_id, first.anchor_id, size=len(array.states))
 
     def _on_pose(self, message: msg.UwbPose) -> None:
         if message.header.frame_id == self._map_frame:
-            self._on_tag(Kind.UWB_POSE, message, message.seq)
+            self._on_tag(Kind.UWB_POSE, message, message.seq, message.tag_id)
         else:  # of anchors that ride on a vehicle
             self._in_other_frames += 1
 
-    def _on_tag(self, kind: Kind, message: Any, seq: int, source: Hashable = 0, links: int = 0) -> None:
-        person = self._people.people.by_tag(message.tag_id)
+    def _on_tag(self, kind: Kind, message: Any, seq: int, tag_id: int, source: Hashable = 0, **measures: int) -> None:
+        person = self._people.people.by_tag(tag_id)
         if person is None:
             if len(self._unknown_tags) < 1024:
-                self._unknown_tags[message.tag_id] = self._unknown_tags.get(message.tag_id, 0) + 1
+                self._unknown_tags[tag_id] = self._unknown_tags.get(tag_id, 0) + 1
             return
-        self._push(person.name, kind, (message.tag_id, source), seq, message, links)
+        self._push(person.name, kind, (tag_id, source), seq, message, **measures)
 
     def _on_person(self, kind: Kind, message: Any, seq: int) -> None:
         if self._people.people.by_name(message.person) is not None:
-            self._push(message.person, kind, 0, seq, message, 0)
+            self._push(message.person, kind, 0, seq, message)
 
-    def _push(self, person: str, kind: Kind, source: Hashable, seq: int, message: Any, links: int) -> None:
-        item = SyncInput(person, kind, source, seq, to_stamp_ns(message.header.stamp), message, links)
+    def _push(self, person: str, kind: Kind, source: Hashable, seq: int, message: Any, **measures: int) -> None:
+        item = SyncInput(person, kind, source, seq, to_stamp_ns(message.header.stamp), message, **measures)
         epochs, _ = self._synchroniser.push(item, self.now_ns())
         self._publish(epochs)
 
@@ -134,7 +136,10 @@ class SynchroniserNode(NodeBase):
             message.header.stamp = to_time(epoch.stamp_ns)
             message.header.frame_id = self._map_frame
             for kind, payloads in epoch.inputs.items():
-                setattr(message, kind.value, payloads)
+                judged = kind is Kind.LINK_STATE
+                setattr(
+                    message, kind.value, [one for array in payloads for one in array.states] if judged else payloads
+                )
             self._epochs.publish(message)
         deadline_ns = self._synchroniser.next_deadline_ns
         if deadline_ns is not None:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from mine_loc_interfaces.msg import CirFrame, DeviceInfo, TdoaArray, UwbRangeArray
+from mine_loc_interfaces.msg import CirFrameArray, DeviceInfo, TdoaArray, UwbRangeArray
 
 from mine_loc_core.errors import ConfigurationError
 from mine_loc_core.health import Health, Level
@@ -20,9 +20,12 @@ from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_uwb.device_stamps import DeviceStamps
 from mine_loc_uwb.nodes.line_messages import LineIds, stamped_message
 from mine_loc_uwb.parameters import Dwm1000DriverParameters
-from mine_loc_uwb.ranging import CirWindow, Message
+from mine_loc_uwb.window_gatherer import Gathered, WindowGatherer
 from mine_loc_uwb.wire.detect import AutoDetect, make_decoder
 from mine_loc_uwb.wire.starting import make_starter
+
+_INCOMPLETE_S = 0.02
+"""So long after its last accumulator the rest of a round is not waited for."""
 
 
 class Dwm1000Driver(NodeBase):
@@ -40,7 +43,7 @@ class Dwm1000Driver(NodeBase):
         self._ids = self._ids_of_line()
         self._ranges = self.publish_to(UwbRangeArray, "uwb/ranges", EVENTS)
         self._tdoa = self.publish_to(TdoaArray, "uwb/tdoa", EVENTS)
-        self._cir = self.publish_to(CirFrame, "uwb/cir", EVENTS)
+        self._cir = self.publish_to(CirFrameArray, "uwb/cir", EVENTS)
         self._info = self.publish_to(DeviceInfo, "~/device_info", LATCHED)
         self.every(0.05, self._talk)
 
@@ -48,6 +51,7 @@ class Dwm1000Driver(NodeBase):
         """Open the port, now or as soon as it appears."""
         p = self.parameters
         self._decoder = AutoDetect() if p.format == "auto" else make_decoder(p.format)
+        self._gatherer = WindowGatherer()
         self._starter = make_starter(p.format)
         self._stamps = self._new_stamps()
         self._announced = ""
@@ -106,24 +110,28 @@ class Dwm1000Driver(NodeBase):
     def _decode(self, chunk: Chunk) -> None:
         if not chunk.data:
             self._decoder.reset()
+            self._gatherer.reset()
             self._starter.reset()
             self._stamps.forget()
             return
         self._starter.observe(chunk.data)
         for message in self._decoder.feed(chunk.data):
-            self._publish(message, chunk.arrival_ns)
+            self._messages += 1
+            self._last_message = time.monotonic()
+            if self._decoder.name != self._announced:
+                self._announce()
+            self._arrival_ns = chunk.arrival_ns
+            self._publish(self._gatherer.take(message))
 
-    def _publish(self, message: Message, arrival_ns: int) -> None:
-        self._messages += 1
-        self._last_message = time.monotonic()
-        if self._decoder.name != self._announced:
-            self._announce()
-        if isinstance(message, CirWindow) and not self._cir.get_subscription_count():
-            return
-        sd_m = self.parameters.range_sd_m
-        stamped = stamped_message(message, self._decoder, self._stamps, arrival_ns, self._ids, sd_m)
-        if stamped is not None:
-            {UwbRangeArray: self._ranges, TdoaArray: self._tdoa, CirFrame: self._cir}[type(stamped)].publish(stamped)
+    def _publish(self, messages: Iterable[Gathered]) -> None:
+        publishers = {UwbRangeArray: self._ranges, TdoaArray: self._tdoa, CirFrameArray: self._cir}
+        for message in messages:
+            if isinstance(message, tuple) and not self._cir.get_subscription_count():
+                continue
+            sd_m = self.parameters.range_sd_m
+            stamped = stamped_message(message, self._decoder, self._stamps, self._arrival_ns, self._ids, sd_m)
+            if stamped is not None:
+                publishers[type(stamped)].publish(stamped)
 
     def _ids_of_line(self) -> LineIds:
         """What site.yaml says of this line."""
@@ -149,8 +157,11 @@ class Dwm1000Driver(NodeBase):
         self._info.publish(info)
 
     def _talk(self) -> None:
-        alive = time.monotonic() - self._last_message < self.parameters.silence_s
+        silent_s = time.monotonic() - self._last_message
+        alive = silent_s < self.parameters.silence_s
         with self._decoding:
+            if silent_s > _INCOMPLETE_S:
+                self._publish(self._gatherer.release())
             words = self._starter.poll(time.monotonic_ns(), stream_alive=alive)
         self._link.write(words)
 

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 
-from mine_loc_interfaces.msg import CirFrame, TdoaArray, UwbRangeArray
+from mine_loc_interfaces.msg import CirFrameArray, TdoaArray, UwbRangeArray
 
 from mine_loc_core.stamps import NS_PER_S
 from mine_loc_uwb.device_stamps import DeviceStamps
-from mine_loc_uwb.nodes.messages import to_cir_frame, to_range_array, to_tdoa_array
-from mine_loc_uwb.ranging import CirWindow, Message, RangingRound, TdoaBlink
+from mine_loc_uwb.nodes.messages import to_cir_array, to_range_array, to_tdoa_array
+from mine_loc_uwb.ranging import RangingRound, TdoaBlink
+from mine_loc_uwb.window_gatherer import Gathered
 from mine_loc_uwb.wire.decoder import Decoder
 
 _FRAME = "uwb_tag_link"
@@ -22,8 +23,8 @@ class LineIds:
 
 
 def stamped_message(
-    message: Message, decoder: Decoder, stamps: DeviceStamps, arrival_ns: int, ids: LineIds, range_sd_m: float
-) -> UwbRangeArray | TdoaArray | CirFrame | None:
+    message: Gathered, decoder: Decoder, stamps: DeviceStamps, arrival_ns: int, ids: LineIds, range_sd_m: float
+) -> UwbRangeArray | TdoaArray | CirFrameArray | None:
     """The ROS message of what `decoder` found in bytes that arrived at `arrival_ns`; None for what is not published."""
     if isinstance(message, RangingRound):
         message = _named(message, ids)
@@ -37,12 +38,13 @@ def stamped_message(
         stamp = stamps.stamp(key, decoder, message.device_ticks, arrival_ns)
         seq = stamps.number((*key, message.tag_id), decoder, message.seq)
         return to_tdoa_array(message, seq, stamp, _FRAME)
-    if isinstance(message, CirWindow):
+    if isinstance(message, tuple):
         # The stamp of its round: by it, what is judged of an accumulator joins the epoch of that round.
-        stamp = stamps.stamp_of_round(message.tag_id, message.seq)
+        first = message[0]
+        stamp = stamps.stamp_of_round(first.tag_id, first.seq)
         if stamp is None:
-            stamp = stamps.stamp((message.anchor_id, message.tag_id), decoder, message.device_ticks, arrival_ns)
-        return to_cir_frame(message, stamp, _FRAME)
+            stamp = stamps.stamp((first.anchor_id, first.tag_id), decoder, first.device_ticks, arrival_ns)
+        return to_cir_array(message, stamp, _FRAME)
     return None
 
 

@@ -1,15 +1,15 @@
 """LOS or NLOS of every reception whose accumulator came with it."""
 
+import itertools
 import os
 import sys
 from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import NoReturn
 
-from mine_loc_interfaces.msg import CirFrame, LinkState, LosModelInfo
+from mine_loc_interfaces.msg import CirFrame, CirFrameArray, LinkState, LinkStateArray, LosModelInfo
 
 from mine_loc_core.health import Health, Level
 from mine_loc_core.nodes.conversions import to_time
@@ -22,8 +22,8 @@ from mine_loc_uwb.link_judgement import Classifier, LinkJudge, load_classifier
 from mine_loc_uwb.nodes.cir_messages import tap_count, to_cir_frames, to_link_state
 from mine_loc_uwb.parameters import LosClassifierParameters
 
-_MOST_WAITING = 1024
-"""Frames that wait for judgement; the oldest are given up beyond."""
+_MOST_WAITING = 256
+"""Rounds that wait for judgement; the oldest are given up beyond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +50,14 @@ class LosClassifier(NodeBase):
         if self._worker is not None:
             self._worker.end()
         self._model: _Model | None = None
-        self._waiting: deque[CirFrame] = deque(maxlen=_MOST_WAITING)
+        self._waiting: deque[CirFrameArray] = deque(maxlen=_MOST_WAITING)
         self._judged = 0
         self._refused: Counter[str] = Counter()
-        self._states = self.publish_to(LinkState, "uwb/link_state", EVENTS)
+        self._states = self.publish_to(LinkStateArray, "uwb/link_state", EVENTS)
         self._info = self.publish_to(LosModelInfo, "~/model_info", LATCHED)
         # torch takes seconds to import, in which the node must answer and be able to stop
         self._worker = self.host.make_worker(self._load, self.guarded(self._judge, "judgement"))
-        self.subscribe(CirFrame, "uwb/cir", self._on_frame, EVENTS)
+        self.subscribe(CirFrameArray, "uwb/cir", self._on_round, EVENTS)
 
     def activate(self) -> None:
         """Take up what came while the node was inactive."""
@@ -102,27 +102,32 @@ class LosClassifier(NodeBase):
         info.header.stamp = to_time(self.now_ns())
         self._info.publish(info)
 
-    def _on_frame(self, frame: CirFrame) -> None:
+    def _on_round(self, array: CirFrameArray) -> None:
         if len(self._waiting) == _MOST_WAITING:
-            self._refused["overflow"] += 1
-        self._waiting.append(frame)
+            self._refused["overflow"] += len(self._waiting[0].frames)
+        self._waiting.append(array)
         self._worker.wake()
 
     def _judge(self) -> None:
         waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
-        for _, group in groupby(waiting, tap_count):
-            self._judge_batch(list(group))
+        frames = [frame for array in waiting for frame in array.frames]
+        states = itertools.chain.from_iterable(
+            self._judge_batch(list(group)) for _, group in itertools.groupby(frames, tap_count)
+        )
+        for array in waiting:
+            of_round = list(itertools.islice(states, len(array.frames)))
+            self._states.publish(LinkStateArray(header=array.header, states=of_round))
 
-    def _judge_batch(self, frames: list[CirFrame]) -> None:
+    def _judge_batch(self, frames: list[CirFrame]) -> list[LinkState]:
         links = [(frame.tag_id, frame.anchor_id) for frame in frames]
         stamps_ns = [to_stamp_ns(frame.header.stamp) for frame in frames]
         judgements = self._links.judge(to_cir_frames(frames), links, stamps_ns)
-        for frame, judged in zip(frames, judgements, strict=True):
+        for judged in judgements:
             if judged.refusal is Refusal.NOT:
                 self._judged += 1
             else:
                 self._refused[judged.refusal.name.lower()] += 1
-            self._states.publish(to_link_state(frame, judged))
+        return [to_link_state(frame, judged) for frame, judged in zip(frames, judgements, strict=True)]
 
 
 def _shipped_model() -> Path:

@@ -1,8 +1,9 @@
 """Decoded radio messages to ROS messages."""
 
 import math
+from collections.abc import Sequence
 
-from mine_loc_interfaces.msg import CirFrame, TdoaArray, TdoaDifference, UwbRange, UwbRangeArray
+from mine_loc_interfaces.msg import CirFrame, CirFrameArray, TdoaArray, TdoaDifference, UwbRange, UwbRangeArray
 
 from mine_loc_core.device_clock import DeviceStamp
 from mine_loc_core.nodes.conversions import to_time
@@ -77,8 +78,18 @@ def to_tdoa_array(message: TdoaBlink, seq: int, stamp: DeviceStamp, frame_id: st
     return array
 
 
-def to_cir_frame(message: CirWindow, stamp: DeviceStamp, frame_id: str) -> CirFrame:
-    """One window of the accumulator."""
+def to_cir_array(windows: Sequence[CirWindow], stamp: DeviceStamp, frame_id: str) -> CirFrameArray:
+    """At most 64 windows of one tag and round."""
+    array = CirFrameArray()
+    array.header.stamp = to_time(stamp.stamp_ns)
+    array.header.frame_id = frame_id
+    array.frames = [_to_cir_frame(window) for window in windows]
+    for frame in array.frames:
+        frame.header = array.header
+    return array
+
+
+def _to_cir_frame(message: CirWindow) -> CirFrame:
     frame = CirFrame(
         tag_id=message.tag_id,
         anchor_id=message.anchor_id,
@@ -95,8 +106,6 @@ def to_cir_frame(message: CirWindow, stamp: DeviceStamp, frame_id: str) -> CirFr
         channel=message.channel,
         prf_mhz=message.prf_mhz,
     )
-    frame.header.stamp = to_time(stamp.stamp_ns)
-    frame.header.frame_id = frame_id
     frame.first_path_amplitude = message.first_path_amplitude
     frame.in_phase.frombytes(message.in_phase.tobytes())
     frame.quadrature.frombytes(message.quadrature.tobytes())

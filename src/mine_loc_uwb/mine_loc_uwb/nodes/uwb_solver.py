@@ -9,6 +9,7 @@ from mine_loc_interfaces.msg import (
     Anchor,
     AnchorMap,
     LinkState,
+    LinkStateArray,
     MeasurementVerdictArray,
     TdoaArray,
     UwbPose,
@@ -63,7 +64,7 @@ class UwbSolver(NodeBase):
         self.every(_PERIOD_S, self._each_second)
         self.subscribe(UwbRangeArray, "uwb/ranges", self._on_round, EVENTS)
         self.subscribe(TdoaArray, "uwb/tdoa", self._on_blink, EVENTS)
-        self.subscribe(LinkState, "uwb/link_state", self._on_link_state, EVENTS)
+        self.subscribe(LinkStateArray, "uwb/link_state", self._on_link_states, EVENTS)
 
     def activate(self) -> None:
         """Tell the map, and compile what the first round would wait for."""
@@ -106,10 +107,11 @@ class UwbSolver(NodeBase):
         found = self._solver.solve_blink(array.tag_id, stamp_ns, self.now_ns(), arrivals, height_m)
         self._publish(*found, array, self.parameters.tdoa_method)
 
-    def _on_link_state(self, state: LinkState) -> None:
-        if state.method != LinkState.METHOD_POWER_RULE:  # the range brings what its powers say
-            stamp_ns = to_stamp_ns(state.header.stamp)
-            self._solver.intake.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
+    def _on_link_states(self, array: LinkStateArray) -> None:
+        stamp_ns = to_stamp_ns(array.header.stamp)
+        for state in array.states:
+            if state.method != LinkState.METHOD_POWER_RULE:  # the range brings what its powers say
+                self._solver.intake.link_state(state.tag_id, state.anchor_id, stamp_ns, state.los_probability)
 
     def _publish(
         self, fix: Fix | None, verdicts: tuple[Verdict, ...], array: UwbRangeArray | TdoaArray, method: str
