@@ -11,7 +11,7 @@ from graph.live_graph import LiveGraph, live_graph
 from graph.observer import Observer
 from graph.processes import Running
 from graph.walker import VISITOR_TAG, frame, ranging
-from mine_loc_interfaces.msg import CirFrame, Epoch, LinkState, LosModelInfo
+from mine_loc_interfaces.msg import CirFrame, CirFrameArray, Epoch, LinkState, LinkStateArray, LosModelInfo
 
 from mine_loc_core.nodes.qos import EVENTS, LATCHED
 from mine_loc_core.stamps import to_stamp_ns
@@ -68,8 +68,8 @@ class Visitor:
 def test_link_states_join_the_epoch_of_their_round(graph):
     """Of one instant and number; at the start they may come after the epoch, until the synchroniser waits for them."""
     observer, visitor = graph.observer, Visitor(graph)
-    states, epochs = observer.listen(LinkState, "uwb/link_state"), observer.listen(Epoch, "sync/epochs")
-    frames = observer.listen(CirFrame, "uwb/cir")
+    judged, epochs = observer.listen(LinkStateArray, "uwb/link_state"), observer.listen(Epoch, "sync/epochs")
+    accumulators = observer.listen(CirFrameArray, "uwb/cir")
 
     def joined() -> list[Any]:
         visitor.send()
@@ -79,12 +79,14 @@ def test_link_states_join_the_epoch_of_their_round(graph):
     for epoch in joined():
         assert {state.range_seq for state in epoch.link_states} == {epoch.ranges[0].seq}
         assert {state.anchor_id for state in epoch.link_states} == {1, 2, 3, 4, 5}
-    for state in states.messages:
+    for state in (state for array in judged.messages for state in array.states):
         assert (state.method, state.refusal) == (LinkState.METHOD_NETWORK, LinkState.REFUSED_NOT)
         assert sum(state.class_probability) == pytest.approx(1.0, abs=1e-4)
         assert state.los_probability == pytest.approx(sum(state.class_probability[2:]), abs=1e-4)
-    judged = {(to_stamp_ns(each.header.stamp), each.anchor_id) for each in states.messages}
-    assert judged <= {(to_stamp_ns(each.header.stamp), each.anchor_id) for each in frames.messages}
+    together = {to_stamp_ns(each.header.stamp): [f.anchor_id for f in each.frames] for each in accumulators.messages}
+    assert list(together.values()) == [[1, 2, 3, 4, 5]] * len(together)
+    for array in judged.messages:
+        assert [state.anchor_id for state in array.states] == together[to_stamp_ns(array.header.stamp)]
 
 
 def test_the_model_in_use_is_told_to_whoever_comes_late(graph):
@@ -107,14 +109,13 @@ def message(*, taps: int = 128, silent: bool = False, **fields: Any) -> CirFrame
 
 
 def judge(observer: Observer, sent: list[CirFrame]) -> list[LinkState]:
-    """What the node says of frames, sent again until it hears them."""
-    heard = observer.listen(LinkState, "uwb/link_state")
-    publisher = observer.node.create_publisher(CirFrame, "uwb/cir", EVENTS)
+    """What the node says of the frames of a round."""
+    heard = observer.listen(LinkStateArray, "uwb/link_state")
+    publisher = observer.node.create_publisher(CirFrameArray, "uwb/cir", EVENTS)
     observer.wait_for(lambda: publisher.get_subscription_count() and "los_classifier: model" in observer.status)
-    for each in sent:
-        publisher.publish(each)
-    observer.wait_for(lambda: len(heard) >= len(sent))
-    return heard.messages
+    publisher.publish(CirFrameArray(frames=sent))
+    observer.wait_for(lambda: len(heard))
+    return heard.messages[0].states
 
 
 def test_frames_that_cannot_be_read_are_refused_by_name_and_counted(domain, observer, tmp_path):

@@ -17,6 +17,7 @@ from mine_loc_interfaces.msg import (
     AnchorMap,
     Epoch,
     LinkState,
+    LinkStateArray,
     MeasurementVerdict,
     MeasurementVerdictArray,
     TdoaArray,
@@ -51,7 +52,7 @@ class Solver:
         self.poses = self.observer.listen(UwbPose, "uwb/pose")
         self.verdicts = self.observer.listen(MeasurementVerdictArray, "uwb/verdicts")
         make = self.observer.node.create_publisher
-        kinds = {UwbRangeArray: "uwb/ranges", TdoaArray: "uwb/tdoa", LinkState: "uwb/link_state"}
+        kinds = {UwbRangeArray: "uwb/ranges", TdoaArray: "uwb/tdoa", LinkStateArray: "uwb/link_state"}
         self._publishers = {kind: make(kind, topic, 10) for kind, topic in kinds.items()}
         self.observer.wait_for(
             lambda: all(publisher.get_subscription_count() for publisher in self._publishers.values()), what="the node"
@@ -87,8 +88,9 @@ class Solver:
 
     def tell(self, tag: int, anchor: int, los_probability: float) -> None:
         state = LinkState(tag_id=tag, anchor_id=anchor, los_probability=los_probability)
-        state.header.stamp = to_time(time.time_ns())
-        self._publishers[LinkState].publish(state)
+        array = LinkStateArray(states=[state])
+        array.header.stamp = to_time(time.time_ns())
+        self._publishers[LinkStateArray].publish(array)
 
     def set_method(self, method: str) -> SetParametersResult:
         value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=method)

@@ -26,6 +26,9 @@ class WalkableArea:
         self.gallery_of_leg = np.array([number for number, _ in legs], dtype=np.int64)
         """(n,): number of the gallery that each leg is part of."""
         self.polygons = tuple(np.array(chamber.polygon_m, dtype=float) for chamber in chambers)
+        boxes = [(*polygon.min(axis=0), *polygon.max(axis=0)) for polygon in self.polygons]
+        self.chamber_boxes = np.array(boxes).reshape(-1, 4)
+        """(m, 4): least x, y and greatest x, y of each chamber."""
 
     @classmethod
     def of(cls, site: Site) -> "WalkableArea | None":

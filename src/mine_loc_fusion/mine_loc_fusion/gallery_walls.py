@@ -12,6 +12,7 @@ their biases. The walls say which; so they are fed back, and the biases take up 
 import math
 
 import numpy as np
+from numba import njit
 
 from mine_loc_core.walkable_area import WalkableArea
 from mine_loc_fusion.estimate import Array
@@ -21,6 +22,7 @@ _LEAST_SHARE = 1e-4
 """Less of the Gaussian than this between the walls: it is the map, or the place, that is wrong."""
 _IN_ROCK_M = 0.05
 _NOTHING_M2 = 1e6
+_SQRT_2PI = math.sqrt(2.0 * math.pi)
 _HALF_WIDTH_M = 2.0
 """Of a common gallery: how far inside its wall the middle is."""
 
@@ -51,48 +53,55 @@ def between_walls(
     `doubted`: ranges placed the person in the rock lately, so across the gallery nothing better is claimed than to be
     in it. Unchanged where several galleries or a chamber are within three standard deviations.
     """
-    sd_m = math.sqrt(max(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), 0.0))
-    found = _only_leg(position_m, _REACH_SD * sd_m, area)
-    if found is None:
+    least = 1.0 / 3.0 if doubted else 0.0  # of a place anywhere in the gallery
+    return _cut_off(position_m, velocity_ms, covariance, area.legs, area.chamber_boxes, least)
+
+
+@njit(cache=True)
+def _cut_off(
+    position_m: Array, velocity_ms: Array, covariance: Array, legs: Array, boxes: Array, least: float
+) -> tuple[Array, Array, Array]:
+    half_trace, off = 0.5 * (covariance[0, 0] + covariance[1, 1]), covariance[0, 1]
+    largest = half_trace + math.sqrt((0.5 * (covariance[0, 0] - covariance[1, 1])) ** 2 + off * off)
+    leg = _only_leg(position_m, _REACH_SD * math.sqrt(max(largest, 0.0)), legs, boxes)
+    if leg < 0:
         return position_m, velocity_ms, covariance
-    across, half_m, off_m = found
-    h = np.array([*across, 0.0, 0.0])
-    Ph = covariance @ h
-    variance_m2 = float(h @ Ph)
-    shift, share = _truncated(math.sqrt(variance_m2), off_m, half_m)
+    x, y, half_m = -legs[leg, 3], legs[leg, 2], legs[leg, 6]
+    off_m = (position_m[0] - legs[leg, 0]) * x + (position_m[1] - legs[leg, 1]) * y
+    Ph = covariance[:, 0] * x + covariance[:, 1] * y
+    variance_m2 = x * Ph[0] + y * Ph[1]
+    shift_m, share = _truncated(math.sqrt(variance_m2), off_m, half_m)
     gain = Ph / variance_m2
-    change = gain * shift
-    kept_m2 = variance_m2 * share
-    if doubted:
-        kept_m2 = max(kept_m2, half_m**2 / 3.0)
+    kept_m2 = max(variance_m2 * share, least * half_m**2)
     kept = covariance + np.outer(gain, gain) * (kept_m2 - variance_m2)
-    return position_m + change[:2], velocity_ms + change[2:], kept
+    return position_m + gain[:2] * shift_m, velocity_ms + gain[2:] * shift_m, kept
 
 
-def _only_leg(position_m: Array, reach_m: float, area: WalkableArea) -> tuple[Array, float, float] | None:
-    """Unit vector across, half width and offset from the centre line of the only leg within reach."""
-    legs = area.legs
-    offset = position_m - legs[:, :2]
-    s = offset[:, 0] * legs[:, 2] + offset[:, 1] * legs[:, 3]
-    t = offset[:, 1] * legs[:, 2] - offset[:, 0] * legs[:, 3]
-    near = (s > legs[:, 4] - reach_m) & (s < legs[:, 5] + reach_m) & (np.abs(t) < legs[:, 6] + reach_m)
-    if near.sum() != 1 or any(_within(position_m, polygon, reach_m) for polygon in area.polygons):
-        return None
-    leg = int(np.argmax(near))
-    return np.array([-legs[leg, 3], legs[leg, 2]]), float(legs[leg, 6]), float(t[leg])
+@njit(cache=True)
+def _only_leg(position_m: Array, reach_m: float, legs: Array, boxes: Array) -> int:
+    """Number of the only leg within reach; -1 where there is none, or another, or a chamber by its bounding box."""
+    x, y = position_m
+    for box in boxes:
+        if box[0] - reach_m < x < box[2] + reach_m and box[1] - reach_m < y < box[3] + reach_m:
+            return -1
+    found = -1
+    for number, leg in enumerate(legs):
+        s = (x - leg[0]) * leg[2] + (y - leg[1]) * leg[3]
+        t = (y - leg[1]) * leg[2] - (x - leg[0]) * leg[3]
+        if leg[4] - reach_m < s < leg[5] + reach_m and abs(t) < leg[6] + reach_m:
+            if found >= 0:
+                return -1
+            found = number
+    return found
 
 
-def _within(position_m: Array, polygon_m: Array, reach_m: float) -> bool:
-    """Whether a chamber may be reached: by its bounding box, from above."""
-    return bool(((position_m > polygon_m.min(axis=0) - reach_m) & (position_m < polygon_m.max(axis=0) + reach_m)).all())
-
-
+@njit(cache=True)
 def _truncated(sd_m: float, mean_m: float, half_m: float) -> tuple[float, float]:
     """Shift of the mean [m] and factor on the variance of a Gaussian cut off at ± `half_m`."""
     a, b = (-half_m - mean_m) / sd_m, (half_m - mean_m) / sd_m
     inside = 0.5 * (math.erf(b / math.sqrt(2.0)) - math.erf(a / math.sqrt(2.0)))
     if inside < _LEAST_SHARE:
         return 0.0, 1.0
-    at_a, at_b = (math.exp(-0.5 * each * each) / math.sqrt(2.0 * math.pi) for each in (a, b))
+    at_a, at_b = math.exp(-0.5 * a * a) / _SQRT_2PI, math.exp(-0.5 * b * b) / _SQRT_2PI
     mean = (at_a - at_b) / inside
     return mean * sd_m, 1.0 + (a * at_a - b * at_b) / inside - mean * mean

@@ -283,9 +283,10 @@ class TightlyCoupled:
         return Verdict(Source.STEP, 0, reason, d2, self._gate, 2)
 
 
-def rehearse(dimensions: int) -> None:
+def rehearse(dimensions: int, area: WalkableArea | None = None) -> None:
     """Take made-up measurements, so that what is compiled is there before the first real ones come."""
-    estimator, at_m, spread_m2 = TightlyCoupled(height_m=1.0 if dimensions == 3 else None), np.zeros(2), np.eye(2)
+    height_m, at_m, spread_m2 = 1.0 if dimensions == 3 else None, np.zeros(2), np.eye(2)
+    estimator = TightlyCoupled(height_m=height_m, area=area)
     estimator.begin(0, at_m, spread_m2, (0.0, 1.0))
     anchors_m = np.array([[9.0, 0.0, 2.0], [0.0, 9.0, 3.0]])
     none, plane_m = np.full(2, math.nan), 1.0 if dimensions == 2 else None
@@ -302,6 +303,7 @@ def rehearse(dimensions: int) -> None:
         )
         place = PlaceFix(Source.LANDMARK, at_m, spread_m2)
         estimator.update(EpochInputs(stamp_ns, steps=(step,), ranges=(measurements,), places=(place,)))
+        estimator.estimate(stamp_ns)
 
 
 def _covariance_or_none(difference_m2: Array) -> Array:

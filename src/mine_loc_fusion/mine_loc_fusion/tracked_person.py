@@ -17,7 +17,7 @@ from mine_loc_fusion.late_inputs import LateInputCorrector
 from mine_loc_fusion.mode import Mode, ModeLimits, mode_of
 from mine_loc_fusion.parameters import FusionParameters
 
-_COSTS_KEPT = 1000
+_COSTS_KEPT = 200
 _INNOVATIONS_KEPT = 200
 
 

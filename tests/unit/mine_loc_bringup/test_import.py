@@ -208,7 +208,7 @@ def test_uwb_cirs_read_from_the_bag_are_those_of_the_folder(tmp_path):
     for name in ("first_path_index", "symbols", "receive_power_dbm", "range_m", "channel"):
         assert getattr(from_bag.frames, name) == pytest.approx(getattr(ours.frames, name), rel=1e-6, nan_ok=True)
     rounds = {message.seq: message for _, message in found["/uwb/ranges"]}
-    judged = [message for _, message in found["/uwb/cir"] if message.range_seq in rounds]
+    judged = [frame for _, array in found["/uwb/cir"] for frame in array.frames if frame.range_seq in rounds]
     assert len(judged) > len(rounds) > 40
     assert all(rounds[message.range_seq].ranges[0].range_raw == message.range for message in judged)
     site = yaml.safe_load((bag / "site" / "site.yaml").read_text())

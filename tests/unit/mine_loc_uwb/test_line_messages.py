@@ -36,13 +36,14 @@ def test_accumulators_bear_the_stamp_of_their_round_however_late_they_come(stamp
     for number in range(20):
         time_us, arrival_ns = 1_000_000 + 100_000 * number, (100 * number + number % 7) * NS_PER_MS
         first = stamped(ranging(number, time_us), arrival_ns)
-        later = [stamped(window(number, time_us + 1500, anchor), arrival_ns + 9 * NS_PER_MS) for anchor in (2, 3)]
+        later = [stamped((window(number, time_us + 1500, anchor),), arrival_ns + 9 * NS_PER_MS) for anchor in (2, 3)]
         assert {to_stamp_ns(each.header.stamp) for each in later} == {to_stamp_ns(first.header.stamp)}
-        assert {each.range_seq for each in later} == {first.seq}
+        assert {frame.range_seq for each in later for frame in each.frames} == {first.seq}
+        assert all(frame.header == each.header for each in later for frame in each.frames)
 
 
 @pytest.mark.parametrize("other", [{"seq": 9}, {"tag_id": 8}])
 def test_an_accumulator_of_another_round_or_tag_has_a_stamp_of_its_own(stamped, other):
     round_ns = to_stamp_ns(stamped(ranging(3, 1_000_000), 0).header.stamp)
-    stray = stamped(replace(window(3, 1_050_000), **other), 50 * NS_PER_MS)
+    stray = stamped((replace(window(3, 1_050_000), **other),), 50 * NS_PER_MS)
     assert to_stamp_ns(stray.header.stamp) == round_ns + 50 * NS_PER_MS

@@ -39,6 +39,8 @@ from mine_loc_uwb.range_correction_file import load_range_correction
 from mine_loc_uwb.range_intake import RangeIntake
 
 _PERIOD_S = 1.0
+_TURNS = 4
+"""What is done for everybody in turn is shared out, lest a round waits for it."""
 _PRESENT = (msg.CoarseRegion.NEW, msg.CoarseRegion.KEPT)
 _SOURCES = (Source.RANGE, Source.TDOA, Source.UWB_POSE, Source.STEP, Source.LANDMARK, Source.REGION, Source.IMU)
 
@@ -69,14 +71,16 @@ class Fusion(NodeBase):
         self.serve(Reset, "~/reset", self._reset)
         self.serve(SetPose, "~/set_pose", self._set_pose)
         self.serve(ToggleSensor, "~/toggle_sensor", self._toggle_sensor)
-        self.every(self.parameters.coast_period_s, self._coast)
-        self.every(_PERIOD_S, self._each_second)
+        self._turn = 0
+        self.every(self.parameters.coast_period_s / _TURNS, self._coast)
+        self.every(_PERIOD_S, self._poll_people)
+        self.every(_PERIOD_S / _TURNS, self._tell_health)
         self.subscribe(msg.Epoch, "sync/epochs", self._on_epoch, EVENTS)
         self.subscribe(msg.CoarseRegionArray, "coarse/regions", self._on_regions, EVENTS)
 
     def activate(self) -> None:
         """Compile what the first epoch would wait for."""
-        rehearse(self._site.dimensions)
+        rehearse(self._site.dimensions, self._area)
 
     def parameters_changed(self) -> None:
         """New parameters start new estimators."""
@@ -198,14 +202,17 @@ class Fusion(NodeBase):
         height_m = tracked.person.tag_height_m
         return self._site.tag_height_m if height_m is None else height_m
 
-    def _each_second(self) -> None:
+    def _poll_people(self) -> None:
         if self._people.poll() is not None:
             self._take_people()
-        if not self._health.get_subscription_count():
-            return
-        now_ns = self.now_ns()
-        for name, tracked in self._tracked.items():
-            self._health.publish(self._to_health(name, tracked, now_ns))
+
+    def _tell_health(self) -> None:
+        """Of a part of the people each time: all at once would keep the next round waiting."""
+        self._turn = (self._turn + 1) % _TURNS
+        if self._health.get_subscription_count():
+            now_ns = self.now_ns()
+            for name, tracked in list(self._tracked.items())[self._turn :: _TURNS]:
+                self._health.publish(self._to_health(name, tracked, now_ns))
 
     def _to_health(self, name: str, tracked: TrackedPerson, now_ns: int) -> msg.FusionHealth:
         costs = np.percentile(tracked.costs_s, [50, 99]) if tracked.costs_s else (0.0, 0.0)
