@@ -5,12 +5,14 @@ the same place, and given as two profiles: magnitude over its peak, and decibels
 side features: powers, noise, delays, and what the measured range says the powers should be in free space.
 """
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 import scipy.fft
+from numba import njit
 from numpy.typing import NDArray
 
 from mine_loc_uwb import delay_features
@@ -58,6 +60,9 @@ class Refusal(IntEnum):
     EMPTY = 4
 
 
+_NOT, _NO_FIRST_PATH, _SATURATED, _TRUNCATED, _EMPTY = map(int, Refusal)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LosInput:
     """Input of `n` accepted frames."""
@@ -83,23 +88,34 @@ class LosInput:
 
 def refusals(frames: CirFrames) -> NDArray[np.int64]:
     """Judge whether each frame can be read: `Refusal` (n,)."""
-    taps = frames.samples.shape[1]
-    first = np.floor(frames.first_path_index) - BEFORE - frames.start_index
-    found = np.full(len(frames), int(Refusal.NOT))
-    if taps == 0:
-        return np.full(len(frames), int(Refusal.EMPTY))
-    inside = (first >= 0) & (first + TAPS <= taps)
-    found[~inside] = Refusal.TRUNCATED
-    held = _window(frames.samples, np.where(inside, first, 0).astype(int)).reshape(len(frames), -1)
-    least, most = held.min(axis=1), held.max(axis=1)
-    found[inside & ((most == _RAIL) | (least <= -_RAIL))] = Refusal.SATURATED
-    found[inside & (most == 0) & (least == 0)] = Refusal.EMPTY
-    position = frames.first_path_index - frames.start_index
-    found[~((frames.first_path_index > 0) & (position >= 0) & (position < taps))] = Refusal.NO_FIRST_PATH
-    silent = ~inside & (found == Refusal.TRUNCATED)
-    if silent.any():
-        found[silent] = np.where(frames.samples[silent].any(axis=(1, 2)), Refusal.TRUNCATED, Refusal.EMPTY)
+    return _refusals(frames.samples, frames.first_path_index, frames.start_index)
+
+
+@njit(cache=True)
+def _refusals(samples: NDArray[np.int16], first_path: NDArray[Any], start: NDArray[np.int64]) -> NDArray[np.int64]:
+    found = np.empty(len(samples), np.int64)
+    for number in range(len(samples)):
+        found[number] = _refusal(samples[number], first_path[number], start[number])
     return found
+
+
+@njit(cache=True)
+def _refusal(samples: NDArray[np.int16], first_path: float, start: int) -> int:
+    """Of samples (taps, 2) whose first is tap `start` of the accumulator."""
+    taps = len(samples)
+    if taps == 0:
+        return _EMPTY
+    if not (first_path > 0.0 and 0.0 <= first_path - start < taps):
+        return _NO_FIRST_PATH
+    first = math.floor(first_path) - BEFORE - start
+    inside = first >= 0 and first + TAPS <= taps
+    held = samples[first : first + TAPS] if inside else samples
+    least, most = held.min(), held.max()
+    if least == 0 and most == 0:
+        return _EMPTY
+    if not inside:
+        return _TRUNCATED
+    return _SATURATED if most == _RAIL or least <= -_RAIL else _NOT
 
 
 def los_input(frames: CirFrames) -> LosInput:
@@ -130,11 +146,25 @@ def _noise_counts(frames: CirFrames, first: NDArray[np.int64], raw: Floats) -> N
     """Deviation of |z| in noise (n,): from many taps ahead of the first path, or the register, or the few there are."""
     quiet = int(first.min()) + BEFORE - _QUIET_TAPS
     if quiet >= _LEAST_QUIET:
-        ahead = frames.samples[:, :quiet].astype(np.float32)
-        return np.asarray(np.maximum(np.hypot(ahead[..., 0], ahead[..., 1]).std(axis=1), 1.0), float)
+        return _deviation(frames.samples[:, :quiet])
     few = np.hypot(raw[:, : BEFORE - 4, 0], raw[:, : BEFORE - 4, 1]).std(axis=1)
     register = frames.noise_std / _STD_NOISE_SHARE
     return np.asarray(np.maximum(np.where(register > 0.0, register, few), 1.0))
+
+
+@njit(cache=True)
+def _deviation(samples: NDArray[np.int16]) -> NDArray[np.float64]:
+    """Of |z| of samples (n, taps, 2) in counts, 1 at least."""
+    found = np.empty(len(samples))
+    for number in range(len(samples)):
+        total = squares = 0.0
+        for i, q in samples[number]:
+            energy = float(i) * float(i) + float(q) * float(q)
+            total += math.sqrt(energy)
+            squares += energy
+        mean = total / samples.shape[1]
+        found[number] = math.sqrt(max(squares / samples.shape[1] - mean * mean, 1.0))
+    return found
 
 
 def _side(frames: CirFrames, window: Floats, fraction: Floats, noise: NDArray[np.float64]) -> Floats:

@@ -3,7 +3,10 @@
 Mean excess delay, RMS delay spread, kurtosis and rise time as in paper A's feature list and hardware.md D.2.
 """
 
+import math
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.floating]
@@ -12,32 +15,46 @@ _AHEAD = 2  # the pulse begins before half of its height
 _EARLY = 4
 
 
+@njit(cache=True)
 def delay_features(window: Floats, before: int, offset: Floats, noise: Floats) -> Floats:
     """Features (n, 8), named by `NAMES`: logarithms of delays in taps, shares and decibels.
 
     window: (n, taps), |z| in counts, whose tap `before` is floor(first path); offset: (n,), delay of the window's first
     tap after the first path, taps; noise: (n,) rms |z| of noise, counts.
     """
-    energy = np.where(window > 3.0 * noise[:, None], window**2 - noise[:, None] ** 2, 0.0)
-    energy[:, : before - _AHEAD] = 0.0
-    total = np.maximum(energy.sum(axis=1), 1.0)
-    delay = np.arange(-before, window.shape[1] - before)
-    mean = energy @ delay / total
-    spread = np.sqrt(np.maximum(energy @ delay**2 / total - mean**2, 0.0))
-    peak = window.max(axis=1)
-    squared = (window - window.sum(axis=1, keepdims=True) / window.shape[1]) ** 2
-    second = squared.sum(axis=1) / window.shape[1]
-    fourth = (squared * squared).sum(axis=1) / window.shape[1]
-    early = energy[:, before - _AHEAD : before + _EARLY].sum(axis=1) / total
-    return np.column_stack(
-        [
-            np.log(np.maximum(mean, 0.3)),
-            np.log(np.maximum(spread, 0.3)),
-            np.log1p(np.maximum(offset + window.argmax(axis=1), 0.0)),
-            np.log(fourth / np.maximum(second**2, 1e-6) + 1e-6),
-            np.log1p(np.maximum(offset + (window > 0.9 * peak[:, None]).argmax(axis=1), 0.0)),
-            early,
-            10.0 * np.log10(early + 1e-3),
-            20.0 * np.log10(peak / noise),
-        ]
-    )
+    features = np.empty((len(window), 8))
+    for number in range(len(window)):
+        row = window[number].astype(np.float64)
+        peak = row.max()
+        energy, mean, spread = _delays(row, before, noise[number])
+        early = energy[before - _AHEAD : before + _EARLY].sum() / max(energy.sum(), 1.0)
+        features[number, 0] = math.log(max(mean, 0.3))
+        features[number, 1] = math.log(max(spread, 0.3))
+        features[number, 2] = math.log1p(max(offset[number] + row.argmax(), 0.0))
+        features[number, 3] = math.log(_kurtosis(row) + 1e-6)
+        features[number, 4] = math.log1p(max(offset[number] + (row > 0.9 * peak).argmax(), 0.0))
+        features[number, 5] = early
+        features[number, 6] = 10.0 * math.log10(early + 1e-3)
+        features[number, 7] = 20.0 * math.log10(peak / noise[number]) if peak > 0.0 else -math.inf
+    return features
+
+
+@njit(cache=True)
+def _delays(row: Floats, before: int, noise: float) -> tuple[Floats, float, float]:
+    """Energy above the noise from the pulse on, its mean delay and the spread of that, taps."""
+    energy = np.zeros(len(row))
+    first = second = 0.0
+    for tap in range(before - _AHEAD, len(row)):
+        if row[tap] > 3.0 * noise:
+            energy[tap] = row[tap] ** 2 - noise**2
+            first += energy[tap] * (tap - before)
+            second += energy[tap] * (tap - before) ** 2
+    total = max(energy.sum(), 1.0)
+    mean = first / total
+    return energy, mean, math.sqrt(max(second / total - mean * mean, 0.0))
+
+
+@njit(cache=True)
+def _kurtosis(row: Floats) -> float:
+    squared = (row - row.mean()) ** 2
+    return float((squared * squared).mean() / max(squared.mean() ** 2, 1e-6))

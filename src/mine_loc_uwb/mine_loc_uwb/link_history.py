@@ -4,6 +4,7 @@ from collections import OrderedDict, deque
 from collections.abc import Hashable, Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
@@ -42,13 +43,10 @@ def with_history(links: Sequence[Hashable], stamp_ns: Sequence[int], side: Float
     return np.array(rows, np.float32).reshape(len(side), 2 * side.shape[1])
 
 
+@njit(cache=True)
 def _median(rows: Floats) -> Floats:
     """Median of each column (k, f) over what is not NaN; NaN where nothing is left."""
-    ordered = np.sort(rows, axis=0)
-    known = np.isfinite(rows).sum(axis=0)
-    columns = np.arange(rows.shape[1])
-    lower, upper = (
-        ordered[np.maximum(known - 1, 0) // 2, columns],
-        ordered[np.minimum(known // 2, len(rows) - 1), columns],
-    )
-    return np.where(known > 0, 0.5 * (lower + upper), np.nan).astype(np.float32)
+    found = np.empty(rows.shape[1], np.float32)
+    for column in range(rows.shape[1]):
+        found[column] = np.nanmedian(rows[:, column])
+    return found

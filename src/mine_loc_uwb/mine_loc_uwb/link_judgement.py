@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mine_loc_uwb.cir_frames import CirFrames
 from mine_loc_uwb.cir_input import LosInput, Refusal, los_input, refusals
 from mine_loc_uwb.link_history import LinkHistory
+from mine_loc_uwb.ranging import DW1000_MAX_TAPS
 from mine_loc_uwb.received_power import los_probability_from_powers
 
 
@@ -53,6 +54,8 @@ class LinkJudge:
     def __init__(self, classifier: Classifier | None) -> None:
         self._classifier = classifier
         self._history = LinkHistory()
+        self.judge(_made_up(), [None], [0])  # compiles what the first round would wait for
+        self.forget()
 
     def forget(self) -> None:
         """Begin all histories anew."""
@@ -77,6 +80,12 @@ class LinkJudge:
         for number, row in zip(fit.tolist(), probability.tolist(), strict=True):
             judged[number] = Judgement(Method.NETWORK, Refusal.NOT, row[2] + row[3], tuple(row))
         return [judged[number] for number in range(len(frames))]
+
+
+def _made_up() -> CirFrames:
+    samples, one = np.zeros((1, DW1000_MAX_TAPS, 2), np.int16), np.ones(1)
+    samples[0, 745] = 1000
+    return CirFrames(samples, np.zeros(1, np.int64), 745.0 * one, *[one] * 5, np.full(1, 5))
 
 
 def _by_powers(first_path_dbm: float, receive_dbm: float) -> Judgement:

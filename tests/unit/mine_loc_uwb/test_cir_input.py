@@ -20,6 +20,7 @@ from mine_loc_uwb.cir_input import (
 POWER = SIDE_NAMES.index("receive_power_against_free_space_db")
 
 
+@settings(deadline=None)
 @given(st.floats(740.0, 752.0))
 def test_the_leading_edge_lies_at_the_same_place_wherever_the_first_path_is(index):
     given_ = los_input(pulses([745.0, index], noise=0.0))
