@@ -85,7 +85,7 @@ class LinkJudge:
 def _made_up() -> CirFrames:
     samples, one = np.zeros((1, DW1000_MAX_TAPS, 2), np.int16), np.ones(1)
     samples[0, 745] = 1000
-    return CirFrames(samples, np.zeros(1, np.int64), 745.0 * one, *[one] * 5, np.full(1, 5))
+    return CirFrames(samples, np.zeros(1, np.int64), 745.0 * one, one, one, one, one, one, np.full(1, 5))
 
 
 def _by_powers(first_path_dbm: float, receive_dbm: float) -> Judgement:
