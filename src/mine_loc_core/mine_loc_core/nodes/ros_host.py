@@ -208,8 +208,9 @@ class _Alarm:
             self.timer.reset()
 
     def cancel(self) -> None:
-        self._due_ns = None
-        self.timer.cancel()
+        if self._due_ns is not None:
+            self._due_ns = None
+            self.timer.cancel()
 
     def _ring(self) -> None:
         self.cancel()

@@ -39,6 +39,7 @@ from mine_loc_uwb.range_correction_file import load_range_correction
 from mine_loc_uwb.range_intake import RangeIntake
 
 _PERIOD_S = 1.0
+_HEALTH_PERIOD_S = 5.0
 _TURNS = 4
 """What is done for everybody in turn is shared out, lest a round waits for it."""
 _PRESENT = (msg.CoarseRegion.NEW, msg.CoarseRegion.KEPT)
@@ -207,12 +208,14 @@ class Fusion(NodeBase):
             self._take_people()
 
     def _tell_health(self) -> None:
-        """Of a part of the people each time: all at once would keep the next round waiting."""
-        self._turn = (self._turn + 1) % _TURNS
-        if self._health.get_subscription_count():
-            now_ns = self.now_ns()
-            for name, tracked in list(self._tracked.items())[self._turn :: _TURNS]:
-                self._health.publish(self._to_health(name, tracked, now_ns))
+        """Of some of the people in turn: all at once would keep the next round waiting."""
+        if not self._health.get_subscription_count():
+            return
+        now_ns, names = self.now_ns(), list(self._tracked)
+        for _ in range(math.ceil(len(names) * _PERIOD_S / _TURNS / _HEALTH_PERIOD_S)):
+            self._turn = (self._turn + 1) % len(names)
+            name = names[self._turn]
+            self._health.publish(self._to_health(name, self._tracked[name], now_ns))
 
     def _to_health(self, name: str, tracked: TrackedPerson, now_ns: int) -> msg.FusionHealth:
         costs = np.percentile(tracked.costs_s, [50, 99]) if tracked.costs_s else (0.0, 0.0)

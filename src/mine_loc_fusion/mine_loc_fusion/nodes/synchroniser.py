@@ -142,7 +142,9 @@ class SynchroniserNode(NodeBase):
                 )
             self._epochs.publish(message)
         deadline_ns = self._synchroniser.next_deadline_ns
-        if deadline_ns is not None:
+        if deadline_ns is None:
+            self._deadline.cancel()
+        else:
             self._deadline.ring_at(deadline_ns)
 
 
