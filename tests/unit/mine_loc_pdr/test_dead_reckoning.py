@@ -38,7 +38,7 @@ def walk(legs, *, step_hz=1.8, mounting=(1.0, 0.0, 0.0, 0.0), bias=(0.0, 0.0, 0.
 
 def push_all(samples, pdr=None, height_m=1.75):
     pdr = pdr or PedestrianDeadReckoning(StrideModel(height_m))
-    return pdr, [event for sample in samples if (event := pdr.push(sample)) is not None]
+    return pdr, [event for sample in samples for event in pdr.push(sample)]
 
 
 def test_before_the_horizon_is_found_there_is_no_pose():
