@@ -127,9 +127,8 @@ def _dead_reckoned(n100: N100Device, stop_ns: int) -> Iterator[tuple[int, EpochI
 
 
 def dead_reckoned(pdr: PedestrianDeadReckoning, sample: ImuSample) -> Iterator[tuple[int, EpochInputs]]:
-    """(arrival, epoch) of the step or change of velocity that a sample completes."""
-    step = pdr.push(sample)
-    if step is not None:
+    """(arrival, epoch) of the steps or the change of velocity that a sample completes."""
+    for step in pdr.push(sample):
         interval_s = math.nan if step.interval_s is None else step.interval_s
         fix = StepFix(step.length_m, step.length_variance_m2, step.heading_rad, step.heading_variance_rad2, interval_s)
         yield sample.stamp_ns, EpochInputs(step.stamp_ns, steps=(fix,))

@@ -153,8 +153,7 @@ def _steps(person: Person, n100: N100Device, stop_ns: int) -> list[ReportedStep]
         if not isinstance(frame, ImuFrame):
             continue
         rate, force = flu_from_frd(frame.angular_velocity_rad_s), flu_from_frd(frame.specific_force_m_s2)
-        step = pdr.push(ImuSample(stamp_ns, rate, force))
-        if step is not None:
+        for step in pdr.push(ImuSample(stamp_ns, rate, force)):
             interval_s = np.nan if step.interval_s is None else step.interval_s
             fix = StepFix(
                 step.length_m, step.length_variance_m2, step.heading_rad, step.heading_variance_rad2, interval_s

@@ -49,7 +49,7 @@ KNOB_VALUES = (0.0, 0.01, 0.02, 0.03)
 class Method(Protocol):
     """Follows one walk."""
 
-    def push(self, stamp_ns: int, heading_rad: float, step: StepEvent | None) -> LandmarkFix | None:
+    def push(self, stamp_ns: int, heading_rad: float, steps: Sequence[StepEvent]) -> LandmarkFix | None:
         """Take what dead reckoning reports with a sample."""
 
     def position_m(self) -> Array:
@@ -70,9 +70,9 @@ class Reset:
         self._track = [(walk.reports[0].stamp_ns, *walk.start_m)]
         self._start_m, self._shift_m = np.array(walk.start_m), np.zeros(2)
 
-    def push(self, stamp_ns: int, heading_rad: float, step: StepEvent | None) -> LandmarkFix | None:
+    def push(self, stamp_ns: int, heading_rad: float, steps: Sequence[StepEvent]) -> LandmarkFix | None:
         """See Method."""
-        if step is not None:
+        for step in steps:
             x_m, y_m = self._start_m + self._to_map @ [step.x_m, step.y_m]
             self._track.append((step.stamp_ns, float(x_m), float(y_m)))
         turn = self._turns.push(stamp_ns, heading_rad)
@@ -102,13 +102,13 @@ class Follower:
         self._follower = PlaneFollower(plane, galleries)
         covariance = np.diag([START_SD_M**2, START_SD_M**2, START_YAW_SD_RAD**2])
         first = walk.reports[0]
-        self._follower.push(first.stamp_ns, first.heading_rad, None)
+        self._follower.push(first.stamp_ns, first.heading_rad, ())
         start = MapPose(first.stamp_ns, *walk.start_m, walk.start_yaw_rad, covariance)
         self._follower.set_pose(start, PENDULUM_SCALE_VARIANCE, walk.bias_sd_rad_s)
 
-    def push(self, stamp_ns: int, heading_rad: float, step: StepEvent | None) -> LandmarkFix | None:
+    def push(self, stamp_ns: int, heading_rad: float, steps: Sequence[StepEvent]) -> LandmarkFix | None:
         """See Method."""
-        return self._follower.push(stamp_ns, heading_rad, step)
+        return self._follower.push(stamp_ns, heading_rad, steps)
 
     def position_m(self) -> Array:
         """See Method."""
@@ -154,11 +154,11 @@ def follow(method: Method, walk: Walk) -> Scored:
     """Push a walk through a method, as the node does."""
     stamps_ns, positions, covariances, verdicts = [], [], [], Counter[str]()
     for report in walk.reports:
-        fix = method.push(report.stamp_ns, report.heading_rad, report.step)
+        fix = method.push(report.stamp_ns, report.heading_rad, report.steps)
         if fix is not None:
             verdicts[fix.verdict.name.lower()] += 1
-        if report.step is not None:
-            stamps_ns.append(report.step.stamp_ns)
+        if report.steps:
+            stamps_ns.append(report.steps[-1].stamp_ns)
             positions.append(method.position_m())
             covariances.append(method.covariance_m2())
     truth_m = walk.truth_m(stamps_ns)

@@ -45,4 +45,4 @@ def _ride(seed: int, band_hz: tuple[float, float], rms_m_s2: float, rocking_rad_
 
 def _steps(detector: StepDetector, motion: Array) -> int:
     rows = (tuple(map(float, row)) for row in motion)
-    return sum(detector.push(k * FRAME_NS, row) is not None for k, row in enumerate(rows, 1))
+    return sum(len(detector.push(k * FRAME_NS, row)) for k, row in enumerate(rows, 1))

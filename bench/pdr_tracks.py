@@ -51,8 +51,8 @@ def track(recording: Recording, detector: StepDetector, model: StepLengthModel |
     pdr = PedestrianDeadReckoning(model, detector=detector)
     steps, latency_s, headings = [], [], []
     for sample in samples(recording):
-        stamp_ns, step = sample.stamp_ns, pdr.push(sample)
-        if step is not None:
+        stamp_ns = sample.stamp_ns
+        for step in pdr.push(sample):
             steps.append(step)
             latency_s.append(to_s(stamp_ns - step.stamp_ns))
         if pdr.heading_rad is not None:

@@ -42,11 +42,11 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What came of one sample: its stamp, where the waist faced in odom, the step that was completed with it."""
+    """What came of one sample: its stamp, where the waist faced in odom, the steps that were completed with it."""
 
     stamp_ns: int
     heading_rad: float
-    step: StepEvent | None
+    steps: Sequence[StepEvent]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class Crew:
             self._people[number], [[0, 0], [length_m, 0]], 0.0, self._walks["standing_s"], self._rng(number, 1)
         )
         reports = _dead_reckoning(self._people[number], self._devices[number], walker, 1.0, self._rng(number, 2))[0]
-        return length_m / sum(report.step.length_m for report in reports if report.step)
+        return length_m / sum(step.length_m for report in reports for step in report.steps)
 
     def _walk(self, number: int, way_name: str, scale: float) -> Walk:
         person, way = self._people[number], self._walks[way_name]
@@ -131,9 +131,9 @@ def _dead_reckoning(
     pdr = PedestrianDeadReckoning(PendulumStrideModel(person.height_m, scale), detector=shipped_detector())
     reports, bias_sd = [], 0.0
     for stamp_ns, rate, force in zip(stamps_ns.tolist(), rates.tolist(), forces.tolist(), strict=True):
-        step = pdr.push(ImuSample(stamp_ns, tuple(rate), tuple(force)))
+        steps = pdr.push(ImuSample(stamp_ns, tuple(rate), tuple(force)))
         if pdr.step_count == 0:
             bias_sd = pdr.bias_sd_rad_s
         if pdr.heading_rad is not None:
-            reports.append(Report(stamp_ns, pdr.heading_rad, step))
+            reports.append(Report(stamp_ns, pdr.heading_rad, steps))
     return reports, bias_sd

@@ -6,6 +6,7 @@ from north does not occur here: x += L cos θ, y += L sin θ with θ counter-clo
 
 import math
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,20 +126,20 @@ class PedestrianDeadReckoning:
         self.step_count = 0
         self.faults: Counter[str] = Counter()
 
-    def push(self, sample: ImuSample) -> StepEvent | None:
-        """Take the next sample and return the step it completes, if any; bad samples are counted and dropped."""
+    def push(self, sample: ImuSample) -> Sequence[StepEvent]:
+        """Take the next sample and return the steps it completes, in order; bad samples are counted and dropped."""
         self.velocity_change = None
         if fault := _fault(sample):
             self.faults[fault] += 1
-            return None
+            return ()
         last, attitude = self._last, self._attitude
         if attitude is None or last is None:
             self._initialise(sample)
-            return None
+            return ()
         dt_ns = sample.stamp_ns - last.stamp_ns
         if not 0 < dt_ns <= LONGEST_DT_NS:
             self._irregular(sample, dt_ns)
-            return None
+            return ()
         self._last = sample
         return self._advance(attitude, last, sample, to_s(dt_ns))
 
@@ -231,7 +232,9 @@ class PedestrianDeadReckoning:
         self.magnetic.interrupted()
         self._interval_before_s = None
 
-    def _advance(self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float) -> StepEvent | None:
+    def _advance(
+        self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float
+    ) -> Sequence[StepEvent]:
         (ax, ay, az), (bx, by, bz) = last.rate_rad_s, sample.rate_rad_s
         if clipped_rad_s := _clipped(last.rate_rad_s, sample.rate_rad_s):
             self.faults["saturated"] += 1
@@ -241,13 +244,13 @@ class PedestrianDeadReckoning:
         if resting_rate := self._rest.push(dt_s, sample.rate_rad_s, sample.force_m_s2):
             self._learn_bias(attitude, resting_rate)
         self._remember(sample, attitude.orientation_imu)
-        step = self._detector.push(sample.stamp_ns, attitude.motion(sample.rate_rad_s, sample.force_m_s2))
-        if step is not None:
+        steps = self._detector.push(sample.stamp_ns, attitude.motion(sample.rate_rad_s, sample.force_m_s2))
+        if steps:
             self._changes.stepped(sample.stamp_ns)
-            return self._walk(attitude, step)
+            return [self._walk(attitude, step) for step in steps]
         orientation = attitude.orientation_imu
         self.velocity_change = self._changes.push(sample.stamp_ns, dt_s, orientation, sample.force_m_s2)
-        return None
+        return ()
 
     def _remember(self, sample: ImuSample, orientation: Quaternion) -> None:
         self._motion.append((sample.stamp_ns, orientation, sample.force_m_s2))

@@ -1,6 +1,6 @@
 """Walks whose heel strikes are marked, as the frames of motion that the step detector would have had of them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,12 +49,12 @@ class _Recorder:
         self.ends_ns: list[int] = []
         self.frames: list[Array] = []
 
-    def push(self, stamp_ns: int, motion: Motion) -> Step | None:
+    def push(self, stamp_ns: int, motion: Motion) -> Sequence[Step]:
         frames = self._stream.push(stamp_ns, motion)
         last_ns = stamp_ns // FRAME_NS * FRAME_NS
         self.ends_ns += range(last_ns - (len(frames) - 1) * FRAME_NS, last_ns + 1, FRAME_NS)
         self.frames += [frame.copy() for frame in frames]
-        return None
+        return ()
 
     def reset(self) -> None:
         self._stream.reset()

@@ -4,6 +4,7 @@ The track begins with a pose in the map that somebody gives; before that turns a
 """
 
 from collections import Counter
+from collections.abc import Sequence
 
 from mine_loc_core.stamps import NS_PER_S, to_s
 from mine_loc_pdr.dead_reckoning import LONGEST_DT_NS, StepEvent
@@ -51,14 +52,14 @@ class PlaneFollower:
         self._track = MapTrack(now, self._heading_rad, scale_variance, rate_sd_rad_s, self._plane, self._galleries)
         return None
 
-    def push(self, stamp_ns: int, heading_rad: float, step: StepEvent | None) -> LandmarkFix | None:
-        """Take the heading in odom at a sample and the step that was completed with it."""
+    def push(self, stamp_ns: int, heading_rad: float, steps: Sequence[StepEvent]) -> LandmarkFix | None:
+        """Take the heading in odom at a sample and the steps that were completed with it."""
         self._bridge(stamp_ns)
         turn = self._turns.push(stamp_ns, heading_rad)
         self._heading_rad = heading_rad
         if self._track is None:
             return None
-        if step is not None:
+        for step in steps:
             self._track.step(step)
         fix = None if turn is None else self._track.turn(turn)
         if fix is not None:

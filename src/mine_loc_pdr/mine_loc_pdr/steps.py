@@ -12,6 +12,7 @@ let through after a full step, when it comes in time.
 import math
 from bisect import bisect_left, insort
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
@@ -76,8 +77,8 @@ class Step:
 class StepDetector(Protocol):
     """Takes the motion of one person's waist sample by sample and reports steps as they are seen."""
 
-    def push(self, stamp_ns: int, motion: Motion) -> Step | None:
-        """Take one sample, whose stamp is later than the last one's; return the step it completes, if any."""
+    def push(self, stamp_ns: int, motion: Motion) -> Sequence[Step]:
+        """Take one sample, whose stamp is later than the last one's; return the steps it completes, in order."""
 
     def reset(self) -> None:
         """Start afresh, after a gap in the data."""
@@ -143,9 +144,13 @@ class PeakStepDetector:
         self._usual_peak_m_s2 = 0.0
         self._usual_interval_s = FIRST_INTERVAL_S
 
-    def push(self, stamp_ns: int, motion: Motion) -> Step | None:
+    def push(self, stamp_ns: int, motion: Motion) -> Sequence[Step]:
         """See StepDetector."""
-        middle_ns, value = stamp_ns, self._without_offset(stamp_ns, motion[0])
+        step = self._completed_by(stamp_ns, motion[0])
+        return () if step is None else (step,)
+
+    def _completed_by(self, stamp_ns: int, up_m_s2: float) -> Step | None:
+        middle_ns, value = stamp_ns, self._without_offset(stamp_ns, up_m_s2)
         for smooth in self._filters:
             middle_ns, value = smooth.push(middle_ns, value)
         if value > 0.0:

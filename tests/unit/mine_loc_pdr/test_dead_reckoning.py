@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from mine_loc_core import quaternion
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
 from mine_loc_pdr.dead_reckoning import ImuSample, PedestrianDeadReckoning
+from mine_loc_pdr.steps import Step
 from mine_loc_pdr.stride import LONGEST_STEP_SHARE, PendulumStrideModel, StrideModel
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -38,7 +39,7 @@ def walk(legs, *, step_hz=1.8, mounting=(1.0, 0.0, 0.0, 0.0), bias=(0.0, 0.0, 0.
 
 def push_all(samples, pdr=None, height_m=1.75):
     pdr = pdr or PedestrianDeadReckoning(StrideModel(height_m))
-    return pdr, [event for sample in samples if (event := pdr.push(sample)) is not None]
+    return pdr, [event for sample in samples for event in pdr.push(sample)]
 
 
 def test_before_the_horizon_is_found_there_is_no_pose():
@@ -55,6 +56,29 @@ def test_a_straight_walk_goes_as_far_as_its_steps_are_long():
     assert (steps[-1].x_m, steps[-1].y_m) == (pose.x_m, pose.y_m)
     assert pose.x_m == pytest.approx(36 * 0.702, rel=0.01)
     assert pose.y_m == pytest.approx(0.0, abs=1e-6)
+
+
+class TellsTwoAtOnce:
+    """Two steps, of half a second each, a third of a second after the second one's strike."""
+
+    def push(self, stamp_ns, _):
+        strikes_ns = [START_NS + 2500 * NS_PER_MS, START_NS + 3000 * NS_PER_MS]
+        if stamp_ns != strikes_ns[1] + 330 * NS_PER_MS:
+            return ()
+        return [Step(strikes_ns[0], None, 3.0, 0.9), Step(strikes_ns[1], 0.5, 3.0, 0.9)]
+
+    def reset(self): ...
+
+
+def test_steps_told_together_lead_each_where_the_waist_faced_at_its_own_time():
+    pdr = PedestrianDeadReckoning(StrideModel(1.75), detector=TellsTwoAtOnce())
+    _, (first, second) = push_all(walk([(0.5, math.pi), (1.0, 0.0)], rest_s=2.5), pdr)
+    assert (first.count, second.count) == (1, 2)
+    assert first.heading_rad == pytest.approx(0.0, abs=0.02)
+    assert second.heading_rad == pytest.approx(math.pi / 4, abs=0.05)
+    assert (first.x_m, first.y_m) == (pytest.approx(first.length_m, abs=0.01), pytest.approx(0.0, abs=0.02))
+    assert (pdr.pose().x_m, pdr.pose().y_m) == (second.x_m, second.y_m)
+    assert second.x_m - first.x_m == pytest.approx(second.length_m * math.cos(second.heading_rad))
 
 
 @pytest.mark.parametrize("roll_pitch", [(0.0, 0.0), (1.1, 0.2), (-0.4, -1.2), (3.0, 0.1)])

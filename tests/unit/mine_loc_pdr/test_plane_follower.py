@@ -18,17 +18,17 @@ BEGIN_S = 100.0
 
 
 def samples(seconds=16.0, turn_s=11.0, begin_s=BEGIN_S):
-    """Standing for a second, walking east at 1.4 m/s, a corner to the left at `turn_s`: stamp, heading, step."""
+    """Standing for a second, walking east at 1.4 m/s, a corner to the left at `turn_s`: stamp, heading, steps."""
     count = 0
     for number in range(round(seconds / PERIOD_S)):
         at_s = number * PERIOD_S
         heading = math.radians(90.0) * min(max(at_s - turn_s + 0.5, 0.0), 1.0)
-        step = None
+        steps = []
         if at_s > 1.0 and number % round(STEP_S / PERIOD_S) == 0:
             count += 1
             stamp_ns = to_ns(begin_s + at_s)
-            step = StepEvent(stamp_ns, count, STEP_S, 0.7, 0.004, heading, 0.01, 0.0, 0.0, 1.0)
-        yield to_ns(begin_s + at_s), heading, step
+            steps = [StepEvent(stamp_ns, count, STEP_S, 0.7, 0.004, heading, 0.01, 0.0, 0.0, 1.0)]
+        yield to_ns(begin_s + at_s), heading, steps
 
 
 def given(stamp_ns=0):

@@ -21,7 +21,7 @@ def detect(values, rate_hz=100, detector=None, start_ns=10**18):
     return [
         (t, s)
         for t, v in zip(stamps, values, strict=True)
-        if (s := detector.push(t, (float(v), 0.0, 0.0, 0.0, 0.0, 0.0)))
+        for s in detector.push(t, (float(v), 0.0, 0.0, 0.0, 0.0, 0.0))
     ]
 
 

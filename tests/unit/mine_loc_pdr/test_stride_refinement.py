@@ -108,8 +108,8 @@ def test_a_new_scale_makes_later_steps_longer_moves_nobody_and_leaves_the_covari
     pdr, lengths = PedestrianDeadReckoning(PendulumStrideModel(1.75)), []
     for k in range(3000):
         up = 9.80665 + (2.5 * math.sin(math.tau * 0.018 * k) if k > 100 else 0.0)
-        step = pdr.push(ImuSample(k * 10 * NS_PER_MS, (0.0, 0.0, 0.0), (0.0, 0.0, up)))
-        lengths += [step.length_m] if step else []
+        steps = pdr.push(ImuSample(k * 10 * NS_PER_MS, (0.0, 0.0, 0.0), (0.0, 0.0, up)))
+        lengths += [step.length_m for step in steps]
         if k == 1500:
             before = pdr.pose()
             pdr.rescale(1.1, 0.01**2)

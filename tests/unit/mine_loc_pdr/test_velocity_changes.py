@@ -68,8 +68,7 @@ def reckon(seconds, force):
     """Dead reckoning of a sensor whose force is told for each sample; steps, and changes with their sample's number."""
     pdr, steps, changes = PedestrianDeadReckoning(PendulumStrideModel(1.75)), [], []
     for number in range(round(100 * seconds)):
-        step = pdr.push(ImuSample(T0 + number * PERIOD_NS, (0.0, 0.0, 0.0), force(0.01 * number)))
-        steps += [step] if step else []
+        steps += pdr.push(ImuSample(T0 + number * PERIOD_NS, (0.0, 0.0, 0.0), force(0.01 * number)))
         changes += [pdr.velocity_change] if pdr.velocity_change else []
     return steps, changes
 

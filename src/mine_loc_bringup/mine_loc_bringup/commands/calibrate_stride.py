@@ -81,7 +81,7 @@ def _modelled(bag: Path, person: Person) -> tuple[int, float]:
 
     model, _ = load_step_model(shipped_step_model())
     pdr = PedestrianDeadReckoning(stride_model(person), detector=NetworkStepDetector(model))
-    lengths_m = [step.length_m for sample in read_walk(bag, person.name) if (step := pdr.push(sample)) is not None]
+    lengths_m = [step.length_m for sample in read_walk(bag, person.name) for step in pdr.push(sample)]
     if len(lengths_m) < _FEWEST_STEPS:
         raise ConfigurationError(f"{bag}: {len(lengths_m)} steps found; allowed: a walk of {_FEWEST_STEPS} or more")
     return len(lengths_m), sum(lengths_m)

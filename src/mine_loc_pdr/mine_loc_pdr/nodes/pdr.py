@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -175,17 +175,17 @@ class Pdr(NodeBase):
 
     def _on_imu(self, track: Track, message: bytes) -> None:
         sample = imu_sample(message)
-        step = track.pdr.push(sample)
+        steps = track.pdr.push(sample)
         track.samples += 1
         track.heard_ns = self.steady_ns()
-        if step is not None:
+        for step in steps:
             self._steps.publish(_step(track.person.name, step))
             self._refine_stride(track, step)
         if (change := track.pdr.velocity_change) is not None:
             track.changes += 1
             self._changes.publish(_velocity_change(track, change))
         if (heading_rad := track.pdr.heading_rad) is not None:
-            self._follow_heading(track, sample, heading_rad, step)
+            self._follow_heading(track, sample, heading_rad, steps)
         period = sample.stamp_ns // self._period_ns
         if period != track.published_period and (pose := track.pdr.pose()) is not None:
             track.published_period = period
@@ -211,10 +211,10 @@ class Pdr(NodeBase):
         track.pdr.push_field(field_sample(message))
         track.field_heard_ns = self.steady_ns()
 
-    def _follow_heading(self, track: Track, sample: ImuSample, heading_rad: float, step: StepEvent | None) -> None:
+    def _follow_heading(self, track: Track, sample: ImuSample, heading_rad: float, steps: Sequence[StepEvent]) -> None:
         if (activity := track.recognise(sample, heading_rad)) is not None:
             self._activities.publish(_activity(track.person.name, activity))
-        if (fix := track.plane.push(sample.stamp_ns, heading_rad, step)) is not None:
+        if (fix := track.plane.push(sample.stamp_ns, heading_rad, steps)) is not None:
             self._landmark_fixes.publish(to_landmark_fix(fix, track.person.name, self._site.map_frame))
 
     def _publish_pose(self, track: Track, pose: OdometryPose) -> None:
