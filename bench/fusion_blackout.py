@@ -58,6 +58,7 @@ def run() -> dict[str, Any]:
     return {
         "end_error_m": spread(astray),
         "recapture_s_mean": float(np.mean(recaptured)),
+        "recapture_s_sd": float(np.std(recaptured, ddof=1)),
         "recapture_s_max": float(np.max(recaptured)),
         "wrong_captures": wrong,
         "runs": len(astray),

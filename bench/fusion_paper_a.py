@@ -132,10 +132,12 @@ def scene_rows(scene_name: str, settings: Mapping[str, Mapping[str, Any]]) -> di
 
 def _row(table: Array) -> dict[str, float | int]:
     mean, largest, ce95, consistency = table[:, :4].mean(axis=0)
+    mean_ci95, largest_ci95 = 1.96 * table[:, :2].std(axis=0, ddof=1) / math.sqrt(len(table))
     return {
         "mean_m": float(mean),
-        "mean_ci95_m": float(1.96 * table[:, 0].std(ddof=1) / math.sqrt(len(table))),
+        "mean_ci95_m": float(mean_ci95),
         "max_m": float(largest),
+        "max_ci95_m": float(largest_ci95),
         "ce95_m": float(ce95),
         "mean_nees": float(consistency),
         "us_per_epoch": float(np.median(table[:, 4])),
