@@ -11,7 +11,7 @@ def _stepping() -> RobustTrackerSettings:
     """The radio, where steps tell the motion: what is left over of a range is a bias that changes within metres."""
     return RobustTrackerSettings(
         acceleration_density_m2_s3=0.05,
-        bias_sd_m=0.09,
+        bias_sd_m=0.1,
         bias_time_s=0.7,
         systematic_sd_m=0.0,
         common_bias_sd_m=0.07,
@@ -27,7 +27,7 @@ def _stepping() -> RobustTrackerSettings:
 
 def _carried() -> RobustTrackerSettings:
     """The radio of who is carried or stands: as with steps, but what obstructs a link is passed sooner."""
-    return replace(_stepping(), acceleration_density_m2_s3=0.1, nlos_time_s=1.0, bias_time_s=2.0)
+    return replace(_stepping(), acceleration_density_m2_s3=0.1, bias_sd_m=0.09, bias_time_s=2.0, nlos_time_s=1.0)
 
 
 @dataclass(frozen=True, slots=True)
