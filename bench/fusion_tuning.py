@@ -1,4 +1,4 @@
-"""Chooses the rivals' settings of bench/fusion_paper_a.py, scene by scene, on tuning seeds (some fifteen minutes).
+"""Chooses the rivals' settings of bench/fusion_paper_a.py, scene by scene, on tuning seeds (some twenty minutes).
 
     python bench/fusion_tuning.py
 
@@ -25,6 +25,7 @@ _WEIGHTED = {
     "nlos_sd_m": [0.3, 0.5, 1.0, 3.0, 10.0],
     "step_share": [0.03, 0.05, 0.07, 0.1],
     "rest_sd_m": [0.005, 0.01, 0.03],
+    "factor_walk_sd": [0.0003, 0.001, 0.003, 0.01],
 }
 SPACE: dict[str, dict[str, list[Any]]] = {
     "los_weighted": _WEIGHTED,

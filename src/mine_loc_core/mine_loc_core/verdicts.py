@@ -1,8 +1,8 @@
 """What became of a measurement, and why: the pure form of mine_loc_interfaces/MeasurementVerdict."""
 
-from dataclasses import dataclass
 from enum import IntEnum
 from math import nan
+from typing import NamedTuple
 
 
 class Source(IntEnum):
@@ -42,9 +42,11 @@ class Reason(IntEnum):
     CAPTURE_GUARD = 16
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """Verdict on one measurement; NaN = not computed. `innovation` in m or rad, signed, a norm for vectors."""
+class Verdict(NamedTuple):
+    """Verdict on one measurement; NaN = not computed. `innovation` in m or rad, signed, a norm for vectors.
+
+    A tuple, because one is made of every range of every round, in a third of the time.
+    """
 
     source: Source
     sensor_id: int

@@ -21,9 +21,10 @@ class LateInputCorrector:
         if self._history and inputs.stamp_ns < self._history[-1][0].stamp_ns - self._history_ns:
             return _stale(inputs)
         while self._history and self._history[-1][0].stamp_ns > inputs.stamp_ns:
-            later, state = self._history.pop()
+            later, before = self._history.pop()
             replay.append(later)
-            self._estimator.restore(state)
+        if replay:
+            self._estimator.restore(before)
         verdicts = self._step(inputs)
         for later in reversed(replay):
             self._step(later)

@@ -43,6 +43,8 @@ _STRIKE_SD_M = 0.03
 """Where the waist is at a heel strike, against the step's ends."""
 _LEAST_SD_M = 1e-3
 """Nobody is placed better; what claims to would leave a covariance of nothing but rounding."""
+_HORIZONTAL = {d: np.ix_([0, 1, d, d + 1], [0, 1, d, d + 1]) for d in (2, 3)}
+"""Where a covariance of d coordinates has that of (x, y, vx, vy)."""
 _HEIGHT_SD_M = 2.0
 _RANGES_HOLD_NS = to_ns(1.0)
 """A position beside ranges not older is made of them."""
@@ -118,9 +120,8 @@ class TightlyCoupled:
         if not tracker.started:
             return None
         d, ahead_s = tracker.dimensions, max(to_s(stamp_ns - self._stamp_ns), 0.0)
-        index = np.array([0, 1, d, d + 1])
         position, velocity = tracker.x[:2].copy(), tracker.x[d : d + 2].copy()
-        covariance = tracker.P[index[:, None], index]
+        covariance = tracker.P[_HORIZONTAL[d]]
         if ahead_s > 0.0:
             position += ahead_s * velocity
             covariance = _ahead(covariance, ahead_s, self._s.stepping.acceleration_density_m2_s3)
@@ -164,8 +165,8 @@ class TightlyCoupled:
         yaw_m2, scale_m2 = self._s.yaw_walk_sd_rad**2 * gone_s, self._s.scale_walk_sd**2 * gone_s
         step_kernel.drift(tracker.P, tracker.first_link, yaw_m2, scale_m2)
         tracker.motion_known = self._yaw_known and since_s(self._step_ns, stamp_ns) < self._s.motion_known_s
-        accelerating = since_s(self._change_ns, stamp_ns) < self._s.motion_known_s
-        believed = self._s.stepping if tracker.motion_known else self._s.carried if accelerating else self._s.alone
+        carried = self._yaw_known or since_s(self._change_ns, stamp_ns) < self._s.motion_known_s
+        believed = self._s.stepping if tracker.motion_known else self._s.carried if carried else self._s.alone
         if believed is not self._believed:
             self._believed = believed
             tracker.believe(believed)

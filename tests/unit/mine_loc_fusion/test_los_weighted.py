@@ -1,10 +1,11 @@
 """Paper A's fusion: the weights are those of relative accuracy, and steps carry on the last fused position."""
 
+import cmath
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from walks import T0, Walk, at, position_fix, step_fix
 
@@ -78,6 +79,42 @@ def test_a_step_carries_the_position_on_along_its_heading_and_makes_it_less_sure
     assert (verdict.source, verdict.reason) == (Source.STEP, Reason.ACCEPTED)
     assert subject.estimate(T0).position_m == pytest.approx([0.8 * math.cos(0.7), 0.8 * math.sin(0.7)])
     assert variance_m2(subject, 0.0) == pytest.approx(0.25 + (PLAIN.step_share * 0.8) ** 2)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_factor_of_steps_follows_as_in_the_textbook_s_filter_of_two_complex_states(seed):
+    rng, told = np.random.default_rng(seed), LosWeightedSettings(rest_sd_m=0.0, factor_walk_sd=0.0)
+    subject = LosWeighted(told)
+    subject.begin(T0, np.zeros(2), 0.01 * np.eye(2), (0.3, 0.04))
+    x, P = np.array([0.0, cmath.rect(1.0, 0.3)]), np.diag([0.01, 0.04]).astype(complex)
+    for number in range(30):
+        length_m, heading = rng.uniform(0.3, 1.0), rng.uniform(-math.pi, math.pi)
+        use(subject, 0.0, steps=(step_fix(length_m, heading, math.nan),))
+        F = np.array([[1.0, cmath.rect(length_m, heading)], [0.0, 1.0]])
+        x, P = F @ x, F @ P @ F.conj().T + np.diag([(told.step_share * length_m) ** 2, 0.0])
+        if number % 3 == 0:
+            place = rng.normal(x[0].real, 0.5), rng.normal(x[0].imag, 0.5)
+            use(subject, 0.0, positions=(position_fix(*place, los=1.0),))
+            gain = P[:, 0] / (P[0, 0] + told.los_sd_m**2)
+            x = x + gain * (complex(*place) - x[0])
+            P = P - np.outer(gain, P[0])
+    found = subject.estimate(T0)
+    assert found.position_m == pytest.approx([x[0].real, x[0].imag])
+    assert found.covariance[0, 0] == pytest.approx(P[0, 0].real)
+    assert math.remainder(found.yaw_offset_rad - cmath.phase(x[1]), math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("yaw_off_rad", "scale"), [(0.2, 1.0), (-0.2, 1.0), (0.0, 1.1), (0.1, 0.9)])
+def test_steps_that_are_turned_and_stretched_are_put_right_by_positions(yaw_off_rad, scale):
+    subject = LosWeighted()
+    subject.begin(T0, np.zeros(2), 0.01 * np.eye(2), (yaw_off_rad, 0.04))
+    for number in range(1, 41):
+        fixes = (position_fix(0.7 * number, 0.0, los=1.0),)
+        use(subject, 0.5 * number, steps=(step_fix(0.7 / scale, 0.0),), positions=fixes if number <= 20 else ())
+    at_m, yaw_rad = subject.estimate(at(20.0)).position_m, subject.estimate(at(20.0)).yaw_offset_rad
+    assert abs(yaw_rad) < 0.02
+    assert np.linalg.norm(at_m - [28.0, 0.0]) < 0.3  # laid on the map once they would be off by 1.4 m and more
 
 
 def test_between_steps_the_person_walks_on_and_the_next_step_replaces_what_was_guessed():

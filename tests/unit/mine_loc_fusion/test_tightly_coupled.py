@@ -167,6 +167,24 @@ def test_after_an_hour_or_a_week_the_person_is_found_within_seconds(silence_s, p
     assert is_covariance(subject._tracker.P)
 
 
+def standing_error_m(seed, yaw):
+    """Root mean square over half a minute on the spot, while what is left over of each range wanders within seconds."""
+    rng, subject = np.random.default_rng(seed), TightlyCoupled()
+    at_m, left_m, squares = np.array([5.0, 5.0]), np.zeros(len(HALL)), []
+    subject.begin(T0, at_m, 0.01 * np.eye(2), yaw)
+    for number in range(1, 300):
+        left_m = 0.95 * left_m + 0.03 * rng.normal(size=len(HALL))
+        subject.update(EpochInputs(at(0.1 * number), ranges=(ranges_to(at_m, at(0.1 * number), noise_m=left_m),)))
+        squares.append(np.sum((subject.estimate(at(0.1 * number)).position_m - at_m) ** 2))
+    return math.sqrt(np.mean(squares))
+
+
+def test_who_stands_with_a_known_yaw_is_not_dragged_about_by_what_is_left_over_of_ranges():
+    errors = np.array([[standing_error_m(seed, yaw) for yaw in ((0.0, 0.01), None)] for seed in range(8)])
+    known, unknown = np.sqrt(np.mean(errors**2, axis=0))
+    assert known < 0.9 * unknown
+
+
 @pytest.mark.parametrize("excess_m", [1.0, 3.0, 20.0])
 @pytest.mark.parametrize("who", [(0,), (1, 2)])
 def test_a_burst_of_long_ranges_hardly_moves_the_person(excess_m, who):
