@@ -10,8 +10,8 @@ from mine_loc_uwb.tracker_settings import RobustTrackerSettings
 def _stepping() -> RobustTrackerSettings:
     """The radio, where steps tell the motion: what is left over of a range is a bias that changes within metres."""
     return RobustTrackerSettings(
-        acceleration_density_m2_s3=0.05,
-        bias_sd_m=0.1,
+        acceleration_density_m2_s3=0.1,
+        bias_sd_m=0.09,
         bias_time_s=0.7,
         systematic_sd_m=0.0,
         common_bias_sd_m=0.07,
@@ -27,7 +27,7 @@ def _stepping() -> RobustTrackerSettings:
 
 def _carried() -> RobustTrackerSettings:
     """The radio of who is carried or stands: as with steps, but what obstructs a link is passed sooner."""
-    return replace(_stepping(), acceleration_density_m2_s3=0.1, bias_sd_m=0.09, bias_time_s=2.0, nlos_time_s=1.0)
+    return replace(_stepping(), nlos_time_s=1.0, bias_time_s=2.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class TightlyCoupledSettings:
     inertial: InertialSettings = field(default_factory=InertialSettings)
     step_along_sd: float = 0.07
     """Of a step's length, relative to it, beyond what all steps of the person share."""
-    step_across_sd_m: float = 0.03
+    step_across_sd_m: float = 0.04
     turn_density_m2_s3: float = 4.0
     """Of white acceleration within a step round a corner: a right angle at walking speed."""
     scale_sd: float = 0.05
