@@ -72,7 +72,7 @@ class Fusion(NodeBase):
         self.serve(Reset, "~/reset", self._reset)
         self.serve(SetPose, "~/set_pose", self._set_pose)
         self.serve(ToggleSensor, "~/toggle_sensor", self._toggle_sensor)
-        self._turn = 0
+        self._turn = self._told = 0
         self.every(self.parameters.coast_period_s / _TURNS, self._coast)
         self.every(_PERIOD_S, self._poll_people)
         self.every(_PERIOD_S / _TURNS, self._tell_health)
@@ -212,9 +212,11 @@ class Fusion(NodeBase):
         if not self._health.get_subscription_count():
             return
         now_ns, names = self.now_ns(), list(self._tracked)
-        for _ in range(math.ceil(len(names) * _PERIOD_S / _TURNS / _HEALTH_PERIOD_S)):
-            self._turn = (self._turn + 1) % len(names)
-            name = names[self._turn]
+        a_second = math.ceil(len(names) * _PERIOD_S / _HEALTH_PERIOD_S)
+        before, self._turn = self._turn, (self._turn + 1) % _TURNS
+        for _ in range(a_second * (before + 1) // _TURNS - a_second * before // _TURNS):
+            self._told = (self._told + 1) % len(names)
+            name = names[self._told]
             self._health.publish(self._to_health(name, self._tracked[name], now_ns))
 
     def _to_health(self, name: str, tracked: TrackedPerson, now_ns: int) -> msg.FusionHealth:
