@@ -1,7 +1,6 @@
 """The trained network compiled for the processor: a round of a few frames is too little work for torch's machinery.
 
-The same arithmetic as `LosNetwork` in evaluation mode, frame by frame; a test holds the two together. Ten times a
-second, a round of four frames takes 1.4 ms with its input stage, by torch 2.4 ms.
+The same arithmetic as `LosNetwork` in evaluation mode, frame by frame; a test holds the two together.
 """
 
 import math
