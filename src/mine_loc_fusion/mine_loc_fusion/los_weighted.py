@@ -55,9 +55,8 @@ class LosWeighted(LooselyCoupled):
         self._variance_m2 = 0.0
         self._factor: complex | None = None
         self._factor_variance = 0.0
-        self._covariance_m = (
-            0j  # mean of the place's error times the conjugate of the factor's, halved as variances are
-        )
+        # mean of the place's error times the conjugate of the factor's, halved as variances are
+        self._covariance_m = 0j
         self._velocity_ms = 0j
         self._carried_m = 0j
         self._strike_ns: int | None = None
