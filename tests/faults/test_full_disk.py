@@ -34,8 +34,7 @@ class Scene:
         self.observer, self.run, self._folder = observer, run, folder
 
     def wait_for(self, happened: Callable[[], object], what: str) -> None:
-        self.observer.wait_for(lambda: happened() or not self.run.alive, what=what)
-        assert self.run.alive, self.run.output
+        self.observer.wait_while_alive(self.run, happened, what)
 
     @contextmanager
     def disk(self) -> Iterator[SmallDisk]:

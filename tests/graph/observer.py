@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from graph.processes import Running
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -66,6 +67,11 @@ class Observer:
             assert waited_s < deadline_s, f"not within {deadline_s} s: {what or happened}; {self.summary()}"
             self._executor.spin_once(timeout_sec=0.02)
         return time.monotonic() - started_s
+
+    def wait_while_alive(self, run: Running, happened: Callable[[], Any], what: str) -> None:
+        """As `wait_for`; fails at once, with what it wrote, when the process ends."""
+        self.wait_for(lambda: happened() or not run.alive, what=what)
+        assert run.alive, run.output
 
     def call(self, kind: type, name: str, request: Any) -> Any:
         client = self._clients.get(name) or self.node.create_client(kind, name)

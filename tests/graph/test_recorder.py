@@ -37,8 +37,7 @@ class Scene:
         return publisher
 
     def wait_for(self, happened: Callable[[], Any], what: str) -> None:
-        self.observer.wait_for(lambda: happened() or not self.run.alive, what=what)
-        assert self.run.alive, self.run.output
+        self.observer.wait_while_alive(self.run, happened, what)
 
     def end(self) -> None:
         self.run.stop()

@@ -130,7 +130,7 @@ class StoreNode(NodeBase):
             self.host.warn(f"{shown(self._url)}: takes rows again, none of those acknowledged is missing")
         self._told = trouble
         if not (trouble or self._limited.busy) and self.steady_ns() >= self._retain_from_ns:
-            self._limited.begin(self._retain)
+            self._limited.begin(self.guarded(self._retain, "retention"))
 
     def _trouble(self) -> str:
         keeper = self._keeper

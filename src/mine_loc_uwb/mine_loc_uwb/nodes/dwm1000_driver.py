@@ -115,12 +115,12 @@ class Dwm1000Driver(NodeBase):
             self._stamps.forget()
             return
         self._starter.observe(chunk.data)
+        self._arrival_ns = chunk.arrival_ns
         for message in self._decoder.feed(chunk.data):
             self._messages += 1
             self._last_message = time.monotonic()
             if self._decoder.name != self._announced:
                 self._announce()
-            self._arrival_ns = chunk.arrival_ns
             self._publish(self._gatherer.take(message))
 
     def _publish(self, messages: Iterable[Gathered]) -> None:
