@@ -17,6 +17,10 @@ YAW, SCALE, STRIKE_X, STRIKE_Y, OWN_STATES = range(5)
 """Places of the own states, and how many they are."""
 
 
+_ROUNDING = 1e-12
+"""Of a variance before, what the difference of two as large may be off by: no place says more than that."""
+
+
 @njit(cache=True)
 def drift(P: Array, first_link: int, yaw_variance_rad2: float, scale_variance: float) -> None:
     """What time adds to the yaw of odom and to the step length's error."""
@@ -92,7 +96,10 @@ def take_step(
 def take_place(x: Array, P: Array, place_m: Array, covariance_m2: Array, gate: float) -> float:
     """Update (x, P) by a horizontal position (2,); returns the squared Mahalanobis distance, beyond `gate` no more."""
     HP = P[:2, :].copy()
-    return correct(x, P, HP, HP[:, :2] + covariance_m2, place_m - x[:2], gate)
+    S = HP[:, :2] + covariance_m2
+    for axis in range(2):
+        S[axis, axis] += _ROUNDING * (P[0, 0] + P[1, 1])
+    return correct(x, P, HP, S, place_m - x[:2], gate)
 
 
 @njit(cache=True)

@@ -312,6 +312,7 @@ def test_a_place_whose_covariance_is_not_symmetric_counts_as_the_mean_of_both_ha
 @settings(max_examples=60, deadline=None)
 @given(seed=SEEDS, known=st.booleans())
 @example(seed=10_472, known=False)
+@example(seed=251_875, known=True)  # an exact place after a spread of kilometres
 def test_whatever_it_is_told_the_estimate_is_finite_and_its_covariance_one(space, seed, known):
     subject, walk = TightlyCoupled(height_m=HEIGHT_M if space else None), Walk(space=space)
     walk.play(subject, 10.0 if known else 0.0)
