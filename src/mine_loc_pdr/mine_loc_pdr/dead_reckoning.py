@@ -26,12 +26,13 @@ from mine_loc_pdr.drift import BIAS, HEADING, DriftModel, X, Y
 from mine_loc_pdr.magnetic_heading import MagneticHeading
 from mine_loc_pdr.mounting import FrontEstimate, FrontFinder, forward_push
 from mine_loc_pdr.rest import RestDetector
-from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, PeakStepDetector, Step, StepDetector
-from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2
+from mine_loc_pdr.step_frames import LONGEST_BRIDGED_NS
+from mine_loc_pdr.steps import LONGEST_INTERVAL_NS, SLOWEST_STEP_S, PeakStepDetector, Step, StepDetector
+from mine_loc_pdr.stride import STEP_TO_STEP_SD_M, StepLengthModel, common_variance_m2, vertical_swing
 from mine_loc_pdr.velocity_changes import VelocityChange, VelocityChanges
 
 INITIAL_SPAN_NS = 500 * NS_PER_MS  # of force averaged for the first horizon
-LONGEST_DT_NS = 200 * NS_PER_MS  # beyond it the motion in between is unknown
+LONGEST_DT_NS = 200 * NS_PER_MS  # beyond it the motion in between is a guess, and counted as a gap
 CLOCK_JUMP_NS = NS_PER_S  # a step back by more is a new clock, not a late sample
 MOTION_SPAN_NS = LONGEST_INTERVAL_NS + NS_PER_S  # a step is reported within a second
 LARGEST_RATE_RAD_S = 100.0  # beyond the range of any such sensor, as is
@@ -41,6 +42,10 @@ SATURATION_RAD_S = 4.0
 MISSED_STEP_SHARE = 0.05  # measured: recall 0.946 on people 1 to 7 of ipol_gait_lowerback
 # Assumed: walking direction against the mean facing of the waist over one step.
 DIRECTION_SD_RAD = math.radians(6.0)
+# Up to the first strike of a walk one foot has gone a step's way, the other none, and the waist half of it.
+FIRST_STEP_SHARE = 0.5
+FIRST_SWING_S = 0.6  # that the waist rises and falls for with it
+LOWEST_AFTER_STRIKE_NS = 150 * NS_PER_MS  # when both feet are on the ground
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +97,7 @@ class PedestrianDeadReckoning:
 
     `faults` counts what was not usable: not_finite, out_of_range, duplicate and backward samples are dropped;
     no_gravity puts the start off; gaps, clock_jumps and saturated rates are carried over with the covariance grown
-    accordingly.
+    accordingly. Across a gap of up to LONGEST_BRIDGED_NS a walk goes on; a longer one ends it.
     """
 
     def __init__(
@@ -117,7 +122,7 @@ class PedestrianDeadReckoning:
         self._motion: deque[tuple[int, Quaternion, Vector3]] = deque()  # stamp, odom←imu, specific force
         self._front = FrontFinder()
         self._step_heading_rad = 0.0
-        self._interval_before_s: float | None = None
+        self._intervals_s: tuple[float | None, float | None] = None, None  # of the two steps before
         self._x_m = self._y_m = self._way_m = 0.0
         self._changes = VelocityChanges()
         self.velocity_change: VelocityChange | None = None
@@ -137,9 +142,11 @@ class PedestrianDeadReckoning:
             self._initialise(sample)
             return ()
         dt_ns = sample.stamp_ns - last.stamp_ns
-        if not 0 < dt_ns <= LONGEST_DT_NS:
+        if not 0 < dt_ns <= LONGEST_BRIDGED_NS:
             self._irregular(sample, dt_ns)
             return ()
+        if dt_ns > LONGEST_DT_NS:
+            self._unseen("gaps", sample.stamp_ns, dt_ns)
         self._last = sample
         return self._advance(attitude, last, sample, to_s(dt_ns))
 
@@ -221,16 +228,24 @@ class PedestrianDeadReckoning:
         if -CLOCK_JUMP_NS <= dt_ns <= 0:
             self.faults["backward" if dt_ns else "duplicate"] += 1
             return
-        self._carry_drift()
-        self.faults["gaps" if dt_ns > 0 else "clock_jumps"] += 1
-        self._drift.gap(to_s(dt_ns if dt_ns > 0 else CLOCK_JUMP_NS))  # how long a jump back took is anyone's guess
-        self._last, self._drift_ns = sample, sample.stamp_ns
+        if dt_ns > 0:
+            self._unseen("gaps", sample.stamp_ns, dt_ns)
+        else:
+            self._unseen("clock_jumps", sample.stamp_ns, CLOCK_JUMP_NS)  # how long it took is anyone's guess
+        self._last = sample
         self._detector.reset()
-        self._rest.reset()
         self._motion.clear()
+        self._intervals_s = None, None
+
+    def _unseen(self, fault: str, until_ns: int, lasted_ns: int) -> None:
+        """What the person did up to the sample at `until_ns` was not measured."""
+        self.faults[fault] += 1
+        self._carry_drift()
+        self._drift.gap(to_s(lasted_ns))
+        self._drift_ns = until_ns
+        self._rest.reset()
         self._changes.interrupted()
         self.magnetic.interrupted()
-        self._interval_before_s = None
 
     def _advance(
         self, attitude: AttitudeFilter, last: ImuSample, sample: ImuSample, dt_s: float
@@ -268,7 +283,7 @@ class PedestrianDeadReckoning:
         self._carry_drift()
         self._drift.turn(math.remainder(heading_rad - self._step_heading_rad, math.tau))
         self._step_heading_rad = heading_rad
-        length_m = self._stride.length_m(self._frequency_hz(step), step.swing_m_s2)
+        length_m = self._length_m(step)
         dx_m, dy_m = length_m * math.cos(heading_rad), length_m * math.sin(heading_rad)
         own_variance_m2 = STEP_TO_STEP_SD_M**2 + (1.0 - step.confidence) * length_m**2
         along_sd_m = math.sqrt(own_variance_m2 + MISSED_STEP_SHARE * length_m**2)
@@ -296,8 +311,7 @@ class PedestrianDeadReckoning:
         What the waist did meanwhile also tells where the front of the body is.
         """
         since_ns = step.stamp_ns - to_ns(step.interval_s or 0.5)
-        chosen = [m for m in self._motion if since_ns < m[0] <= step.stamp_ns] or [self._motion[-1]]
-        stamps_ns, orientations, forces = zip(*chosen, strict=True)
+        stamps_ns, orientations, forces = self._between(since_ns, step.stamp_ns)
         facing = quaternion.rotate(orientations, attitude.forward_imu)[:, :2]
         if step.interval_s is not None:
             phase_rad = (np.array(stamps_ns) - since_ns) * (math.tau / (step.stamp_ns - since_ns))
@@ -305,12 +319,34 @@ class PedestrianDeadReckoning:
         east, north = facing.sum(axis=0)
         return math.atan2(north, east)
 
-    def _frequency_hz(self, step: Step) -> float | None:
-        """Over two steps, so that a limp does not lengthen one leg."""
-        before_s, self._interval_before_s = self._interval_before_s, step.interval_s
+    def _length_m(self, step: Step) -> float:
+        """Its frequency is that of two steps, so that a limp does not lengthen one leg.
+
+        The long interval that begins a walk is no part of its rhythm.
+        """
+        earlier_s, before_s = self._intervals_s
+        self._intervals_s = before_s, step.interval_s
+        swing_m_s2 = self._swing_m_s2(step)
         if step.interval_s is None:
-            return None
-        return 1.0 / step.interval_s if before_s is None else 2.0 / (before_s + step.interval_s)
+            return FIRST_STEP_SHARE * self._stride.length_m(None, swing_m_s2)
+        if earlier_s is None or before_s is None:
+            return self._stride.length_m(1.0 / step.interval_s, swing_m_s2)
+        return self._stride.length_m(2.0 / (before_s + step.interval_s), swing_m_s2)
+
+    def _swing_m_s2(self, step: Step) -> float:
+        """Of the vertical acceleration, from one lowest point of the waist to the next."""
+        lasted_s = FIRST_SWING_S if step.interval_s is None else min(step.interval_s, SLOWEST_STEP_S)
+        until_ns = step.stamp_ns + LOWEST_AFTER_STRIKE_NS
+        since_ns = until_ns - to_ns(lasted_s)
+        stamps_ns, orientations, forces = self._between(since_ns, until_ns)
+        phase_rad = (np.array(stamps_ns) - since_ns) * (math.tau / (until_ns - since_ns))
+        return vertical_swing(phase_rad, quaternion.rotate(orientations, forces)[:, 2])
+
+    def _between(self, since_ns: int, until_ns: int) -> tuple[Sequence[int], Sequence[Quaternion], Sequence[Vector3]]:
+        """Stamps, orientations and forces after `since_ns` and up to `until_ns`; the last ones if there are none."""
+        chosen = [m for m in self._motion if since_ns < m[0] <= until_ns] or [self._motion[-1]]
+        stamps_ns, orientations, forces = zip(*chosen, strict=True)
+        return stamps_ns, orientations, forces
 
     def _carry_drift(self) -> None:
         """Bring the drift model up to the last sample."""

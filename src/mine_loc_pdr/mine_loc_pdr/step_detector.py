@@ -8,11 +8,8 @@ other out.
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S, to_s
 from mine_loc_pdr.step_frames import FRAME_NS, FrameStream
@@ -22,8 +19,6 @@ from mine_loc_pdr.steps import ADAPTATION, FIRST_INTERVAL_S, LONGEST_INTERVAL_NS
 LOOKAHEAD_S = 0.3
 SHORTEST_INTERVAL_NS = 280 * NS_PER_MS
 _LOOKAHEAD_NS = round(LOOKAHEAD_S * NS_PER_S)
-_SMOOTHING = np.convolve(np.full(6, 1.0 / 6.0), np.full(6, 1.0 / 6.0))  # two means of 120 ms
-_FIRST_SWING_FRAMES = 30
 _FIRST_ODDS = 1.5  # of a step that begins a walk alone
 _PAIR_ODDS = 2.0  # product of those of two that begin a walk together
 _LONGEST_PAIR_NS = NS_PER_S  # from one of them to the other
@@ -59,7 +54,6 @@ class NetworkStepDetector:
         self._last_step_ns: int | None = None
         self._usual_interval_s = FIRST_INTERVAL_S
         self._doubted: tuple[Step, float] | None = None  # that may begin a walk, and its odds
-        self._vertical: deque[float] = deque(maxlen=LONGEST_INTERVAL_NS // FRAME_NS)
 
     def push(self, stamp_ns: int, motion: Motion) -> Sequence[Step]:
         """See StepDetector."""
@@ -68,7 +62,6 @@ class NetworkStepDetector:
         end_ns = stamp_ns // FRAME_NS * FRAME_NS - len(frames) * FRAME_NS
         for frame in frames:
             end_ns += FRAME_NS
-            self._vertical.append(float(frame[0]))
             logit = self._stream.push(frame)
             probability = 1.0 / (1.0 + math.exp(-logit)) if logit > -30.0 else 0.0
             steps += self._at_maximum(end_ns, probability)
@@ -106,7 +99,7 @@ class NetworkStepDetector:
         if odds >= _FIRST_ODDS:
             return (self._walk_on(stamp_ns, None, probability),)
         if doubted is None or since_ns >= SHORTEST_INTERVAL_NS or odds > doubted[1]:
-            self._doubted = self._step(stamp_ns, None, probability), odds
+            self._doubted = Step(stamp_ns, None, _confidence(probability)), odds
         return ()
 
     def _hurry(self, interval_s: float) -> float:
@@ -118,16 +111,7 @@ class NetworkStepDetector:
         if interval_s is not None:
             self._usual_interval_s += ADAPTATION * (min(interval_s, SLOWEST_STEP_S) - self._usual_interval_s)
         self._last_step_ns, self._doubted = stamp_ns, None
-        return self._step(stamp_ns, interval_s, probability)
-
-    def _step(self, stamp_ns: int, interval_s: float | None, probability: float) -> Step:
-        frames = _FIRST_SWING_FRAMES if interval_s is None else round(interval_s / to_s(FRAME_NS))
-        return Step(stamp_ns, interval_s, self._swing_m_s2(frames), _confidence(probability))
-
-    def _swing_m_s2(self, frames: int) -> float:
-        """From valley to peak of the smoothed vertical acceleration in the last frames."""
-        recent = np.fromiter(self._vertical, float)[-(frames + len(_SMOOTHING) - 1) :]
-        return float(np.ptp(np.convolve(recent, _SMOOTHING, "valid" if len(recent) >= len(_SMOOTHING) else "same")))
+        return Step(stamp_ns, interval_s, _confidence(probability))
 
 
 def _odds(probability: float) -> float:

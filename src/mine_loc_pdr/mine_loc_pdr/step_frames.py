@@ -14,13 +14,13 @@ Array = NDArray[np.float64]
 
 FRAME_NS = 20 * NS_PER_MS
 CHANNELS = 6
-LONGEST_GAP_NS = 200 * NS_PER_MS  # between samples: beyond it the motion in between is unknown
-MOST_FRAMES = LONGEST_GAP_NS // FRAME_NS + 1  # that one sample can complete
+LONGEST_BRIDGED_NS = 600 * NS_PER_MS  # between samples: a step may be lost in it, a walk is not
+MOST_FRAMES = LONGEST_BRIDGED_NS // FRAME_NS + 1  # that one sample can complete
 _OFFSET_TIME_CONSTANT_S = 2.0  # of the mean that takes out what the accelerometer adds to gravity
 
 
 class FrameStream:
-    """Integrates the lines between samples over each frame. Stamps must increase, by LONGEST_GAP_NS at most."""
+    """Integrates the lines between samples over each frame. Stamps must increase, by LONGEST_BRIDGED_NS at most."""
 
     def __init__(self) -> None:
         self._state = np.zeros(2 * CHANNELS + 1)  # motion of the last sample, its integral over the frame, offset

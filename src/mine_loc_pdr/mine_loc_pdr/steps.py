@@ -64,13 +64,11 @@ class StepThresholds:
 class Step:
     """One step: `stamp_ns` is the heel strike, `interval_s` the time since the step before, None after standing.
 
-    `swing_m_s2` is of the smoothed vertical acceleration: the way from the deepest valley since the step before to the
-    peak. `confidence` is the probability that this was a step.
+    `confidence` is the probability that this was a step.
     """
 
     stamp_ns: int
     interval_s: float | None
-    swing_m_s2: float
     confidence: float
 
 
@@ -136,7 +134,7 @@ class PeakStepDetector:
         self._last_sample_ns: int | None = None
         self._baseline = 0.0
         self._positive = False
-        self._peak_m_s2 = self._valley_m_s2 = 0.0
+        self._peak_m_s2 = 0.0
         self._rise_ns = self._fall_ns = 0
         self._awaiting_valley = self._foreseen = False
         self._last_step_ns: int | None = None
@@ -162,9 +160,7 @@ class PeakStepDetector:
         if self._positive:
             self._positive, self._fall_ns = False, middle_ns
             self._awaiting_valley = not self._foreseen and middle_ns - self._rise_ns <= _LONGEST_PEAK_NS
-        step = self._at_valley(middle_ns, value) if self._awaiting_valley else None
-        self._valley_m_s2 = min(self._valley_m_s2, value)
-        return step
+        return self._at_valley(middle_ns, value) if self._awaiting_valley else None
 
     def _overdue(self, middle_ns: int, value: float) -> Step | None:
         """The step of a slow peak that is past, in a walk: its valley would come too late to be waited for."""
@@ -221,8 +217,7 @@ class PeakStepDetector:
 
     def _step(self, stamp_ns: int, interval_s: float | None) -> Step:
         self._last_step_ns = stamp_ns
-        swing_m_s2, self._valley_m_s2 = self._peak_m_s2 - self._valley_m_s2, 0.0
-        return Step(stamp_ns, interval_s, swing_m_s2, _confidence(self._peak_m_s2))
+        return Step(stamp_ns, interval_s, _confidence(self._peak_m_s2))
 
 
 def _confidence(peak_m_s2: float) -> float:

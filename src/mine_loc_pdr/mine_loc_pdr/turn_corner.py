@@ -11,12 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mine_loc_core.stamps import NS_PER_MS
 from mine_loc_pdr.turns import Turn
 
 Array = NDArray[np.float64]
 
 LEAST_CROSSING_SINE = 0.5  # of the angle between two ways, for the crossing to be sharp
 LONGEST_LEG_M = 3.0  # from the beginning or the end of a turn to the crossing
+# So long before its first tenth and after its ninth, a turn has no part in the way yet, or no more.
+CLEAR_NS = 250 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +44,7 @@ def corner_of(turn: Turn, track: Sequence[tuple[int, float, float]]) -> Corner |
     stamps, x, y = np.array(track).T
     begin, middle, end = (
         np.array([np.interp(t, stamps, x), np.interp(t, stamps, y)])
-        for t in (turn.begin_ns, turn.middle_ns, turn.end_ns)
+        for t in (turn.begin_ns - CLEAR_NS, turn.middle_ns, turn.end_ns + CLEAR_NS)
     )
     here = np.array([x[-1], y[-1]])
     ahead, onward = _unit(turn.before_rad), _unit(turn.before_rad + turn.angle_rad)

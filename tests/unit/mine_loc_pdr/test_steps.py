@@ -142,12 +142,6 @@ def test_thresholds_follow_the_person():
     assert len(shuffling) <= 10
 
 
-def test_the_swing_is_the_way_from_valley_to_peak():
-    steps = [s for _, s in detect(walk(20, 1.8, amplitude=2.5))]
-    gain = np.sinc(1.8 * 0.12) ** 2
-    assert all(s.swing_m_s2 == pytest.approx(2 * 2.5 * gain, rel=0.05) for s in steps[6:])
-
-
 def test_a_long_lift_is_no_step():
     assert detect(np.concatenate((np.zeros(100), np.full(80, 2.0), np.full(80, -2.0), np.zeros(100)))) == []
 

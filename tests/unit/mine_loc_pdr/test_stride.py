@@ -2,12 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_core.people import Person, Stride
-from mine_loc_pdr.stride import PendulumStrideModel, StrideModel, common_variance_m2, stride_model
+from mine_loc_pdr.stride import PendulumStrideModel, StrideModel, common_variance_m2, stride_model, vertical_swing
 from mine_loc_pdr.stride_calibration import WALK_TO_WALK_SD, calibrate_scale
 
 
@@ -40,6 +41,21 @@ def test_the_pendulum_steps_further_with_more_swing_height_and_time():
     assert PendulumStrideModel(1.9).length_m(1.79, 3.5) > usual
     assert model.length_m(None, 3.5) == usual
     assert PendulumStrideModel(1.75, scale=1.1).length_m(1.79, 3.5) == pytest.approx(1.1 * usual)
+
+
+@pytest.mark.parametrize(("steps", "begun_rad"), [(1, 0.0), (2, 1.0), (5, -2.5)])
+def test_the_swing_is_the_way_from_valley_to_peak_in_the_rhythm_of_the_steps(steps, begun_rad):
+    phase_rad = np.linspace(0.0, math.tau * steps, 60 * steps, endpoint=False)
+    rise = 2.5 * np.cos(phase_rad + begun_rad)
+    knock = np.where(phase_rad % math.tau < 0.3, 8.0, 0.0)
+    assert vertical_swing(phase_rad, 9.8 + rise) == pytest.approx(5.0)
+    assert vertical_swing(phase_rad, 2.5 * np.cos(3.0 * phase_rad)) == pytest.approx(0.0, abs=1e-9)
+    assert abs(vertical_swing(phase_rad, rise + knock) - 5.0) < 0.2 * np.ptp(rise + knock)
+
+
+def test_a_bouncier_walk_is_longer_but_by_less_than_a_pendulum_s():
+    model = PendulumStrideModel(1.75)
+    assert model.length_m(1.79, 4.0) == pytest.approx(2.0**0.4 * model.length_m(1.79, 2.0))
 
 
 def test_a_pause_within_a_step_makes_it_no_longer():
