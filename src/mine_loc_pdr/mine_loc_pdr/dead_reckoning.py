@@ -343,8 +343,8 @@ class PedestrianDeadReckoning:
         return vertical_swing(phase_rad, quaternion.rotate(orientations, forces)[:, 2])
 
     def _between(self, since_ns: int, until_ns: int) -> tuple[Sequence[int], Sequence[Quaternion], Sequence[Vector3]]:
-        """Stamps, orientations and forces after `since_ns` and up to `until_ns`; the last ones if there are none."""
-        chosen = [m for m in self._motion if since_ns < m[0] <= until_ns] or [self._motion[-1]]
+        """Stamps, orientations and forces after `since_ns` and up to `until_ns`; all there are if none are of then."""
+        chosen = [m for m in self._motion if since_ns < m[0] <= until_ns] or self._motion
         stamps_ns, orientations, forces = zip(*chosen, strict=True)
         return stamps_ns, orientations, forces
 

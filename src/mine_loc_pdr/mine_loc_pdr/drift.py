@@ -53,8 +53,8 @@ class DriftModel:
         transition[X, HEADING], transition[Y, HEADING] = -dy_m, dx_m
         transition[X, SCALE], transition[Y, SCALE] = dx_m / scale, dy_m / scale
         self._propagate(transition)
-        length_m = math.hypot(dx_m, dy_m)
-        c, s = dx_m / length_m, dy_m / length_m
+        course_rad = math.atan2(dy_m, dx_m)
+        c, s = math.cos(course_rad), math.sin(course_rad)
         axes = np.array([[c, -s], [s, c]])
         self.covariance[:2, :2] += axes @ np.diag([along_sd_m**2, across_sd_m**2]) @ axes.T
 

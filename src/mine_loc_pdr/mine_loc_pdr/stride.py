@@ -21,8 +21,8 @@ TYPICAL_FREQUENCY_HZ = 1.79
 # paper B's model is 15 % long in the mean, sd 9 %; the pendulum's people differ by 4 % and each one's walks by 3 %.
 UNCALIBRATED_SCALE_VARIANCE = 0.13**2
 PENDULUM_SCALE_VARIANCE = 0.05**2
-PENDULUM_FACTOR = 0.472  # least mean error over the same walks, as is the exponent
-SWING_EXPONENT = 0.4
+PENDULUM_FACTOR = 0.49  # least mean error over the same walks, as is the exponent
+SWING_EXPONENT = 0.375
 # No one walks with longer steps, by body height; a knock, or a step missed before, must not make one.
 LONGEST_STEP_SHARE = 0.6
 # Assumed: step to step at constant frequency, no public recording at hand measures single steps.
@@ -73,7 +73,7 @@ class StrideModel:
 
 @dataclass(frozen=True, slots=True)
 class PendulumStrideModel:
-    """The waist as the top of an inverted pendulum, nearly: L = c √H · swing^0.4 / SF · K.
+    """The waist as the top of an inverted pendulum, nearly: L = c √H · swing^0.375 / SF · K.
 
     A waist that moves up and down by h on a leg of length l ∝ H makes steps of 2 √(2 l h) (Zijlstra and Hof,
     "Assessment of spatio-temporal gait parameters from trunk accelerations during human walking", Gait & Posture 18,

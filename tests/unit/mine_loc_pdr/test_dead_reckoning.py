@@ -42,6 +42,23 @@ def push_all(samples, pdr=None, height_m=1.75):
     return pdr, [event for sample in samples for event in pdr.push(sample)]
 
 
+class TellsLate:
+    """One step, five seconds after its strike: its motion is forgotten by then."""
+
+    def push(self, stamp_ns, _):
+        return [Step(START_NS + 2000 * NS_PER_MS, None, 0.9)] if stamp_ns == START_NS + 7000 * NS_PER_MS else ()
+
+    def reset(self): ...
+
+
+@pytest.mark.parametrize("walking_s", [0.0, 6.0])
+def test_a_step_told_too_late_to_be_measured_leaves_a_sound_track(walking_s):
+    pdr = PedestrianDeadReckoning(PendulumStrideModel(1.75), detector=TellsLate())
+    _, (step,) = push_all(walk([(walking_s, 0.0)], rest_s=8.0 - walking_s), pdr)
+    assert 0.0 <= step.length_m < 0.6
+    assert np.all(np.linalg.eigvalsh(pdr.pose().covariance) >= 0.0)
+
+
 def test_before_the_horizon_is_found_there_is_no_pose():
     pdr, _ = push_all(walk([(1.0, 0.0)])[:10])
     assert pdr.pose() is None
