@@ -20,7 +20,8 @@ demo: setup      ## the live graph on a recording (RECORDING=m1l|isas_walk1|gene
 	    $(if $(SITE),--site "$(SITE)") --people "$(PEOPLE)"
 
 test: setup      ## all checks: style, types, unit, live graph and fault tests
-	@$(run) ruff format --check --quiet src tests bench examples && ruff check src tests bench examples && mypy && pytest
+	@$(run) ruff format --check --quiet src tests bench examples && ruff check src tests bench examples && mypy \
+	    && pytest --numprocesses auto tests/unit && pytest --ignore tests/unit
 
 check: setup     ## style and types only
 	@$(run) ruff format --check --quiet src tests bench examples && ruff check src tests bench examples && mypy

@@ -3,11 +3,15 @@
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 pytest.importorskip("rclpy")
 
 from graph.domains import lent_domain
 from graph.observer import Observer
+
+settings.register_profile("no test is timed", deadline=None)
+settings.load_profile("no test is timed")
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ def test_an_honest_covariance_is_found_consistent_and_a_boast_is_not():
     assert boast.claimed_ce95_holds_high < 0.95
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(yaw=st.floats(-3.1, 3.1), x=st.floats(-1e3, 1e3), y=st.floats(-1e3, 1e3), seed=st.integers(0, 1000))
 def test_rigid_alignment_makes_the_frame_of_the_truth_irrelevant(yaw, x, y, seed):
     outputs = track(noisy(seed=seed))
@@ -81,14 +81,14 @@ def test_rigid_alignment_makes_the_frame_of_the_truth_irrelevant(yaw, x, y, seed
         assert getattr(other, name) == pytest.approx(getattr(own, name), rel=1e-5)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(yaw=st.floats(-3.0, 3.0))
 def test_without_alignment_another_frame_is_an_error(yaw):
     turned = truth(transform=Alignment(0.0, yaw, np.array([5.0, 0.0])))
     assert measured(track(path_m(TIMES_S)), turned).rmse_m > 1.0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(offset_s=st.floats(-8.0, 8.0), rigid=st.booleans(), seed=st.integers(0, 1000))
 def test_the_time_offset_is_found_and_applied_only_on_request(offset_s, rigid, seed):
     outputs, late = track(noisy(0.05, seed)), truth(offset_s=offset_s, from_s=-10.0, to_s=SECONDS + 10.0)

@@ -22,7 +22,7 @@ def towards(point_m, places_m=PLACES_M):
 
 
 @given(st.floats(0.0, 4000.0), st.floats(50.0, 2900.0), st.sampled_from([-1.0, 1.0]))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_point_projected_to_bearings_crosses_back_to_itself(x_m, y_m, side):
     point_m = np.array([x_m, side * y_m])
     found = crossed(towards(point_m))

@@ -3,7 +3,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_coarse.bearing_report import BearingReport
@@ -110,7 +110,6 @@ def test_what_does_not_fit_the_wire_is_refused_when_encoding(change: dict[str, f
 
 
 @given(stream=streams, sizes=st.lists(st.integers(1, 60), min_size=1, max_size=5))
-@settings(deadline=None)
 def test_chunking_changes_neither_reports_nor_losses(stream: bytes, sizes: list[int]):
     whole, chunked = decoder(), decoder()
     expected, got, rest = whole.feed(stream), [], stream
@@ -130,7 +129,6 @@ def test_damage_of_one_character_never_gives_a_report_and_is_counted(at: int, fl
 
 
 @given(stream=streams)
-@settings(deadline=None)
 def test_a_good_line_after_any_damage_is_found(stream: bytes):
     reading = decoder()
     reading.feed(stream)

@@ -34,7 +34,7 @@ def test_a_mirrored_track_stays_mirrored():
     assert np.linalg.norm(Alignment(0.0, yaw, shift).apply(source) - mirrored, axis=1).mean() > 0.5
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(offset_s=st.floats(-1.9, 1.9), yaw=st.floats(-3.0, 3.0), seed=st.integers(0, 1000))
 def test_offset_and_transform_are_found_through_noise(offset_s, yaw, seed):
     times_s = np.arange(5.0, 35.0, 0.1)

@@ -35,7 +35,7 @@ def test_a_covariance_that_is_none_gives_no_nees():
     assert np.isnan(found[1:]).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10_000))
 def test_the_mean_nees_of_an_honest_estimator_is_mostly_within_its_interval(seed):
     errors = np.random.default_rng(seed).normal(size=(400, 300, 2))

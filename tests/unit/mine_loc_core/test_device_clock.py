@@ -54,7 +54,7 @@ def line_of(rng, count, *, jitter_ms, spikes, stall_ms):
     return np.rint(np.maximum.accumulate(at_ms + delays) * NS_PER_MS).astype(np.int64)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     seed=st.integers(0, 2**32 - 1),
     skew=st.floats(-50e-6, 50e-6),
@@ -115,7 +115,7 @@ def test_the_counter_may_wrap(tick_s, bits, start_ticks):
     assert np.abs(errors_ms(rows) - 3.0).max() <= tick_s * 1e3 + 0.001
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(silence_s=st.floats(0.1, 120.0))
 def test_silence_longer_than_a_wrap_does_not_shift_the_stamps(silence_s):
     subject, device = clock(), Device(skew=20e-6, start_ticks=7 * 10**11)
@@ -145,7 +145,7 @@ def test_a_step_of_the_host_clock_is_followed_within_a_second_and_told(step_s):
     assert np.abs(errors_ms(rows[20:]) - 3.0).max() < 5.0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(steps=st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=4))
 def test_no_step_of_the_host_clock_puts_a_stamp_after_its_arrival(steps):
     subject, device, step_s = clock(), Device(), 0.0

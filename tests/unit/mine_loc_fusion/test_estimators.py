@@ -86,7 +86,7 @@ def test_what_is_restored_goes_on_to_the_same_estimate(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=SEEDS, known=st.booleans())
 def test_all_survive_whatever_they_are_told(method, seed, known):
     subject, walk = make_estimator(method, 0.2, None, None), Walk()

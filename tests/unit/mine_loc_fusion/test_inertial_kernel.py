@@ -55,7 +55,7 @@ def take(x, P, dimensions, first_link, change, *, yaw_known, gate=math.inf):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, DIMENSIONS, st.booleans())
 def test_a_change_is_the_textbook_s_update_component_by_component(seed, dimensions, yaw_known):
     x, P, first_link = state(seed, dimensions)
@@ -73,7 +73,7 @@ def test_a_change_is_the_textbook_s_update_component_by_component(seed, dimensio
 
 
 @given(SEEDS, DIMENSIONS, st.booleans())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_beyond_the_gate_nothing_changes(seed, dimensions, yaw_known):
     x, P, first_link = state(seed, dimensions)
     x[dimensions] += 50.0
@@ -84,7 +84,7 @@ def test_beyond_the_gate_nothing_changes(seed, dimensions, yaw_known):
 
 
 @given(SEEDS, DIMENSIONS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_velocity_that_is_remembered_is_the_velocity_with_all_its_covariances(seed, dimensions):
     x, P, _ = state(seed, dimensions)
     kernel.remember_velocity(x, P, dimensions)
@@ -96,7 +96,7 @@ def test_a_velocity_that_is_remembered_is_the_velocity_with_all_its_covariances(
 
 
 @given(SEEDS, DIMENSIONS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_yaw_that_is_forgotten_is_as_likely_any(seed, dimensions):
     x, P, _ = state(seed, dimensions)
     rest = P.copy()
@@ -111,7 +111,7 @@ def test_a_yaw_that_is_forgotten_is_as_likely_any(seed, dimensions):
 
 
 @given(SEEDS, DIMENSIONS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_error_of_acceleration_comes_to_rest_at_how_large_it_is(seed, dimensions):
     x, P, _ = state(seed, dimensions)
     kernel.pass_time(x, P, dimensions, 1e6, SDS, TIMES)
@@ -122,7 +122,7 @@ def test_the_error_of_acceleration_comes_to_rest_at_how_large_it_is(seed, dimens
 
 
 @given(SEEDS, DIMENSIONS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_yaw_that_is_settled_is_the_angle_with_the_covariance_of_its_linearisation(seed, dimensions):
     x, P, first_link = state(seed, dimensions)
     own, yaw = 2 * dimensions + 1, first_link - OWN_STATES + YAW

@@ -51,7 +51,7 @@ def assert_same(a, b):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.data())
 def test_any_order_within_the_history_gives_exactly_the_result_of_the_right_order(data):
     epochs = walk(60)

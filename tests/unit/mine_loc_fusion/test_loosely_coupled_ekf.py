@@ -194,7 +194,7 @@ EPOCH = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(EPOCH, max_size=30), st.booleans())
 def test_no_input_makes_the_estimate_nan_or_its_covariance_indefinite(epochs, known):
     subject = walk(15, yaw=0.3)[0] if known else Ekf()

@@ -81,7 +81,7 @@ def test_a_step_carries_the_position_on_along_its_heading_and_makes_it_less_sure
     assert variance_m2(subject, 0.0) == pytest.approx(0.25 + (PLAIN.step_share * 0.8) ** 2)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_the_factor_of_steps_follows_as_in_the_textbook_s_filter_of_two_complex_states(seed):
     rng, told = np.random.default_rng(seed), LosWeightedSettings(rest_sd_m=0.0, factor_walk_sd=0.0)

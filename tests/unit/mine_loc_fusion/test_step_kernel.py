@@ -46,7 +46,7 @@ def textbook(x, P, H, R, innovation):
     return x + K @ innovation, rest @ P @ rest.T + K @ R @ K.T, float(innovation @ np.linalg.inv(S) @ innovation)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, DIMENSIONS, st.floats(0.1, 2.0), st.floats(-math.pi, math.pi))
 def test_a_step_is_the_textbook_s_update_by_the_way_since_the_strike(seed, dimensions, length_m, heading_rad):
     x, P, first_link = state(seed, dimensions)
@@ -61,7 +61,7 @@ def test_a_step_is_the_textbook_s_update_by_the_way_since_the_strike(seed, dimen
     assert pytest.approx(wanted_P, rel=1e-6, abs=1e-8) == P
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, DIMENSIONS, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_a_place_is_the_textbook_s_update_by_a_horizontal_position(seed, dimensions, east_m, north_m):
     x, P, _ = state(seed, dimensions)
@@ -72,7 +72,6 @@ def test_a_place_is_the_textbook_s_update_by_a_horizontal_position(seed, dimensi
     assert pytest.approx(wanted_P, rel=1e-9, abs=1e-12) == P
 
 
-@settings(deadline=None)
 @given(SEEDS, DIMENSIONS)
 def test_a_strike_remembered_is_the_position_in_everything_that_is_known_of_it(seed, dimensions):
     x, P, first_link = state(seed, dimensions)
@@ -114,7 +113,7 @@ def test_time_adds_to_the_yaw_and_to_the_scale_alone():
     assert len(x) == len(P)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(SEEDS, DIMENSIONS)
 def test_the_covariance_stays_one_over_a_thousand_steps_and_places(seed, dimensions):
     x, P, first_link = state(seed, dimensions)

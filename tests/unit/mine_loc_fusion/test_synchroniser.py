@@ -210,7 +210,7 @@ def play(arrivals, subject):
     return taken, out + [(now_ns, epoch) for now_ns in polls_ns for epoch in subject.poll(now_ns)]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(traffic())
 def test_every_input_is_used_once_or_refused_and_epochs_that_are_not_late_go_forward(arrivals):
     subject = synchroniser()
@@ -235,7 +235,7 @@ def test_every_input_is_used_once_or_refused_and_epochs_that_are_not_late_go_for
     assert all(out_at[a.input.payload] - a.now_ns <= WAIT_NS + NS_PER_MS for a in accepted)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(traffic())
 def test_the_same_arrivals_give_the_same_epochs(arrivals):
     assert play(arrivals, synchroniser()) == play(arrivals, synchroniser())

@@ -309,7 +309,7 @@ def test_a_place_whose_covariance_is_not_symmetric_counts_as_the_mean_of_both_ha
 
 
 @pytest.mark.parametrize("space", [False, True])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=SEEDS, known=st.booleans())
 @example(seed=10_472, known=False)
 @example(seed=251_875, known=True)  # an exact place after a spread of kilometres

@@ -25,7 +25,7 @@ def epoch(ms, x=0.0):
     return EpochInputs(T0 + ms * NS_PER_MS, (PositionFix(np.array([x, 0.0]), np.eye(2) * 0.01),))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(st.integers(0, 10_000), st.integers(0, 10_000)), min_size=1, max_size=30))
 def test_outputs_never_go_back_whatever_comes_when(events):
     subject, last_ns = tracked(), 0

@@ -48,7 +48,7 @@ def test_the_front_is_where_the_steps_push_and_not_where_the_body_sways(yaw_deg)
 angles = st.floats(-3.1, 3.1)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.builds(quaternion.from_euler_zyx, angles, st.floats(-1.5, 1.5), angles))
 def test_the_mounting_found_turns_the_front_of_the_sensor_into_the_front_of_the_body(q):
     pdr = walked(walking(15.0, q))

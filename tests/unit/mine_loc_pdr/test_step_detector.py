@@ -203,7 +203,7 @@ def test_standing_and_sitting_down_is_no_step():
     assert sum(len(detect(sitting_down(rng, 300))) for _ in range(20)) <= 1
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32), st.floats(0.1, 500.0))
 def test_steps_of_any_motion_are_in_order_and_apart(seed, scale):
     motion = scale * np.random.default_rng(seed).standard_normal((400, CHANNELS))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_core.stamps import NS_PER_MS, NS_PER_S
@@ -18,7 +18,6 @@ def frames_of(stamps_ns, values):
     return np.concatenate([stream.push(t, motion([v])).copy() for t, v in zip(stamps_ns, values, strict=True)])[:, 1]
 
 
-@settings(deadline=None)  # the first call compiles
 @given(st.lists(st.integers(1, 200), min_size=2, max_size=60), st.floats(-3, 3), st.floats(-3, 3))
 def test_a_line_is_met_at_the_middle_of_every_frame_whatever_the_stamps(apart_ms, at_start, slope):
     stamps_ns = 10**18 + np.concatenate(([0], np.cumsum(apart_ms))) * NS_PER_MS

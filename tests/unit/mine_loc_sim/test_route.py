@@ -112,7 +112,7 @@ def test_an_impossible_route_is_refused_with_its_reason(points, says):
 coordinate = st.floats(-100.0, 100.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(coordinate, coordinate), min_size=2, max_size=7), st.floats(0.4, 2.0))
 def test_any_route_passes_its_ends_within_its_speed_and_its_corridor(corners, speed):
     points = [WayPoint((x, y, 0.0)) for x, y in corners]

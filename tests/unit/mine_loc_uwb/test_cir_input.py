@@ -20,7 +20,6 @@ from mine_loc_uwb.cir_input import (
 POWER = SIDE_NAMES.index("receive_power_against_free_space_db")
 
 
-@settings(deadline=None)
 @given(st.floats(740.0, 752.0))
 def test_the_leading_edge_lies_at_the_same_place_wherever_the_first_path_is(index):
     given_ = los_input(pulses([745.0, index], noise=0.0))
@@ -69,7 +68,7 @@ def test_what_is_not_known_is_nan_and_the_rest_is_there():
     assert los_input(frames).without_range().side[0, POWER] != 0.0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 9.0), st.floats(0.0, 1100.0), st.sampled_from([0, 100, 128, 300]))
 def test_whatever_stands_in_an_accumulator_is_read_without_nan_or_refused(seed, log_counts, index, taps):
     rng = np.random.default_rng(seed)

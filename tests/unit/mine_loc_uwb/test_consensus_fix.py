@@ -15,7 +15,7 @@ def find(anchors, ranges, height_m=1.0):
     return consensus_fix(anchors, ranges, range_sd_m=0.05, nlos_scale_m=0.6, height_m=height_m)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.integers(4, 9), st.sampled_from([1.0, None]))
 def test_exact_ranges_give_the_exact_position_unless_another_is_as_good(seed, count, height_m):
     rng = np.random.default_rng(seed)

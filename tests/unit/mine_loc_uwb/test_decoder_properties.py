@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mine_loc_uwb.ranging import CirWindow, Range, RangingRound, TdoaBlink, TdoaDifference
@@ -79,7 +79,6 @@ def test_each_frame_of_a_clean_stream_gives_one_message_and_no_loss(name):
 
 @every_format
 @given(data=st.data(), sizes=st.lists(st.integers(1, 60), min_size=1, max_size=5))
-@settings(deadline=None)
 def test_chunking_changes_neither_messages_nor_losses(name, data, sizes):
     stream = data.draw(streams(name))
     whole, chunked = make_decoder(name), make_decoder(name)
@@ -95,7 +94,6 @@ def test_chunking_changes_neither_messages_nor_losses(name, data, sizes):
 
 @every_format
 @given(data=st.data())
-@settings(deadline=None)
 def test_good_frames_after_any_damage_are_found(name, data):
     decoder, reference = make_decoder(name), make_decoder(name)
     decoder.feed(data.draw(streams(name)) + FLUSH.get(name, b"\n"))

@@ -121,7 +121,7 @@ def test_nodes_on_a_line_never_begin_a_track():
         assert set(solution.reasons) == {Reason.DEGENERATE}
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.booleans(), st.booleans())
 def test_whatever_is_measured_a_fix_is_finite_or_none(seed, count, shared, height):
     rng = np.random.default_rng(seed)

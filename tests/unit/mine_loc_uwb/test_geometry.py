@@ -18,7 +18,7 @@ def jacobian(position, anchors, height_m):
     return (offsets / np.linalg.norm(offsets, axis=1)[:, None])[:, : len(position)]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(SEEDS, st.integers(1, 6), st.sampled_from([1e-6, 1.0, 1e6]))
 def test_a_positive_definite_system_is_solved_as_numpy_does(seed, size, scale):
     rng = np.random.default_rng(seed)
@@ -59,7 +59,7 @@ def test_a_position_on_an_anchor_gives_a_finite_direction():
     assert np.isfinite(unit).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(SEEDS, st.integers(4, 12), st.sampled_from([2, 3]))
 def test_gdop_is_the_root_of_the_trace_of_the_inverse_information(seed, count, dimensions):
     rng = np.random.default_rng(seed)
@@ -89,7 +89,7 @@ def test_an_anchor_of_weight_0_does_not_count():
     assert gdop(position, anchors, np.zeros(3), 1.0) == math.inf
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS, st.sampled_from([2, 3]))
 def test_inverse_information_is_that_of_the_weighted_jacobian_and_symmetric(seed, dimensions):
     rng = np.random.default_rng(seed)

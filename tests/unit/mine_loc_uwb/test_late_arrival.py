@@ -9,7 +9,7 @@ from mine_loc_uwb.late_arrival import LateArrival
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.05, 8.0), st.floats(0.02, 1.5))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_density_integrates_to_one_over_its_span(late, delay_m, sd_m):
     law = LateArrival(late, delay_m, floor_probability=1e-9)
     grid = np.arange(-10.0 * sd_m, 10.0 * sd_m + 25.0 * delay_m, 0.02 * min(sd_m, delay_m + sd_m))
@@ -39,7 +39,7 @@ def test_a_late_arrival_costs_less_than_an_early_one_and_neither_costs_without_e
     assert np.isfinite(lost)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 6), st.floats(-1e3, 1e3))
 def test_a_shared_offset_changes_nothing(seed, count, offset_m):
     rng, law = np.random.default_rng(seed), LateArrival()
@@ -50,7 +50,7 @@ def test_a_shared_offset_changes_nothing(seed, count, offset_m):
     assert there == pytest.approx(here, abs=1e-3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 5))
 @example(83197928, 2).via("one of two arrivals from no path")
 def test_the_offset_is_integrated_out(seed, count):

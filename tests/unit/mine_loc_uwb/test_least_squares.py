@@ -20,7 +20,7 @@ def scene(seed, count, origin=0.0):
     return rng.uniform(0, 40, (count, 3)) + origin, rng.uniform(0, 40, 3) + origin
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(3, 12), st.sampled_from([0.0, 5e3, -4e6]))
 def test_exact_ranges_give_the_exact_position_at_a_known_height(seed, count, origin):
     anchors, tag = scene(seed, count, origin)
@@ -33,7 +33,7 @@ def test_exact_ranges_give_the_exact_position_at_a_known_height(seed, count, ori
     assert np.linalg.eigvalsh(fix.covariance_m2)[0] >= -1e-12
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(4, 12), st.sampled_from([0.0, 5e3]))
 def test_exact_ranges_give_the_exact_position_in_space(seed, count, origin):
     anchors, tag = scene(seed, count, origin)
@@ -52,7 +52,7 @@ def test_too_few_ranges_give_no_position(height_m, enough):
         assert np.isnan(fix.position_m).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(-3.1, 3.1), st.sampled_from([0.0, 1e5]))
 def test_anchors_on_a_line_or_in_one_place_determine_nothing(seed, yaw, origin):
     rng = np.random.default_rng(seed)

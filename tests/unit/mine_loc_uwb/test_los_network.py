@@ -85,7 +85,7 @@ def test_the_same_seed_gives_the_same_network(data, trained):
     assert all(torch.equal(a, b) for a, b in zip(trained.parameters(), again.parameters(), strict=True))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**30 - 1))
 def test_whatever_is_missing_probabilities_are_probabilities(hidden):
     network = LosNetwork().eval()

@@ -38,7 +38,7 @@ def test_the_obstructed_law_integrates_to_one_and_is_late_by_its_scale_on_averag
     assert mean == pytest.approx(scale, rel=1e-6)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.floats(-60.0, 60.0), st.floats(1e-4, 1e4), st.floats(0.05, 5.0))
 def test_the_obstructed_law_is_scipys_exponentially_modified_gaussian(error, variance, scale):
     sd = math.sqrt(variance)
@@ -60,7 +60,7 @@ def test_a_spread_of_many_scales_leaves_the_gaussian(sd):
 LAWS = (st.floats(1e-3, 900.0), st.floats(0.01, 0.97), st.floats(0.2, 2.0))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.floats(-4.0, 8.0), *LAWS)
 def test_score_and_information_are_derivatives_of_the_logarithm_of_the_law(z, variance, p, scale):
     sd = math.sqrt(variance)
@@ -72,7 +72,7 @@ def test_score_and_information_are_derivatives_of_the_logarithm_of_the_law(z, va
     assert second == pytest.approx(-(above - 2 * here + below) / step**2, rel=1e-3, abs=2e-3 * size**2)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.floats(-300.0, 300.0), *LAWS)
 def test_the_score_is_finite_and_p_a_probability_for_any_error(error, variance, p, scale):
     first, second, nlos = score(error, variance, p, scale, OUTLIER)
@@ -90,7 +90,7 @@ def test_a_long_range_makes_the_link_look_obstructed_and_a_fitting_one_clear():
     assert score(-0.1, 0.01, 0.5, 0.6, OUTLIER)[2] < 0.2
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-3.0, 3.0), st.floats(1e-3, 100.0))
 def test_the_deviance_of_a_clear_link_is_the_squared_mahalanobis_distance(error, variance):
     if error**2 / variance < 1400.0:  # beyond it the density underflows
@@ -112,7 +112,7 @@ def test_the_deviance_of_the_impossible_is_infinite():
     assert deviance(-45.0, 0.01, 0.5, 0.6) == math.inf
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-3.0, 9.0), *LAWS)
 def test_a_squared_distance_is_never_negative(error, variance, p, scale):
     assert deviance(error, variance, p, scale) >= 0.0

@@ -123,7 +123,7 @@ def test_stamps_that_go_back_are_not_used():
     assert solver.solve(measure(TRIANGLE, place(1.0), stamp_s=1.0)).reasons == (Reason.BACKWARD,) * 3
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.booleans(), st.booleans())
 def test_whatever_is_measured_a_fix_is_finite_or_none(seed, count, shared, height):
     rng = np.random.default_rng(seed)

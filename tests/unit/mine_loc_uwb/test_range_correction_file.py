@@ -61,7 +61,7 @@ def corrections(draw):
     return RangeCorrection(offset_m, law, draw(st.sampled_from([None, nlos])), latency_s)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(corrections())
 def test_what_is_written_is_read_back_to_the_last_digit(tmp_path, correction):
     errors = {"NLOS": RangeError(100, 1.37, 1.4, 1.9)}

@@ -124,7 +124,7 @@ def test_places_are_held_out_whole():
     assert fit.loss_m_by_degree[fit.polynomial.degree - 1] == pytest.approx(np.abs(left_m).mean())
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6), st.sampled_from(["absolute", "squares"]))
 def test_whatever_the_pairs_the_polynomial_rises(seed, loss):
     rng = np.random.default_rng(seed)

@@ -45,7 +45,7 @@ def test_too_few_ranges_start_nothing(heard, reason):
 # Geometry.
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(SEEDS, st.integers(0, 9), st.booleans())
 def test_any_anchors_with_any_dropouts_give_a_finite_fix_or_say_why_not(seed, count, space):
     rng = np.random.default_rng(seed)

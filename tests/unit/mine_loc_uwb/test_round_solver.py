@@ -155,7 +155,7 @@ ANY_RANGE = st.builds(
 
 
 @pytest.mark.parametrize("method", RANGE_METHODS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.dictionaries(st.integers(1, 8), st.tuples(*[st.floats(-500.0, 500.0)] * 3), max_size=8),
     st.lists(st.lists(ANY_RANGE, max_size=12), min_size=1, max_size=4),
@@ -180,7 +180,7 @@ def test_any_rounds_on_any_anchors_give_finite_positions_or_say_why_not(method, 
             assert np.isnan(fix.position_m).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.lists(ANY_RANGE, max_size=8))
 def test_after_any_round_good_ones_are_solved_again(seed, rubbish):
     """What one bad message does to a track is over within the stated time of re-opening."""

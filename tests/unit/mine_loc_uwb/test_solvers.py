@@ -39,7 +39,7 @@ def keeps_its_promises(solution, count: int) -> None:
 
 
 @pytest.mark.parametrize("method", RANGE_METHODS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 8), st.booleans())
 def test_any_rounds_on_any_anchors_are_answered_range_by_range(method, seed, count, space):
     rng = np.random.default_rng(seed)

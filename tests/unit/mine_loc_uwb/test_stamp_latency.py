@@ -31,7 +31,7 @@ def walk(latency_s, seed=1, speed=1.0, seconds=120.0, anchors=4):
     return TimedRanges(stamps, range_m, anchor, ANCHORS_M[anchor], track_ns, at(speed * track_s))
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(-0.4, 0.4), st.integers(0, 1000))
 def test_the_latency_is_found_with_its_sign_in_spite_of_offsets_and_outliers(latency_s, seed):
     found = fit_stamp_latency(walk(latency_s, seed))

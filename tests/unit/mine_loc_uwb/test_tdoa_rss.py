@@ -24,7 +24,7 @@ def test_three_nodes_and_the_closure_give_the_exact_place(parameters, tag):
     assert fix.position_m == pytest.approx(tag, abs=1e-3)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds, st.sampled_from([ALONE, JOINT]), st.booleans(), st.booleans(), st.sampled_from([0.0, 5e3]))
 def test_exact_arrivals_of_many_nodes_give_the_exact_place(seed, parameters, shared, height, origin):
     rng = np.random.default_rng(seed)
@@ -35,7 +35,7 @@ def test_exact_arrivals_of_many_nodes_give_the_exact_place(seed, parameters, sha
     assert is_covariance(fix.covariance_m2)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds, st.integers(0, 8), st.booleans(), st.booleans())
 def test_whatever_is_measured_a_fix_is_finite_or_none(seed, count, shared, height):
     rng = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def test_too_few_nodes_give_no_position(height, enough):
         assert (fix.status, reason) == (FixStatus.TOO_FEW_RANGES, Reason.DEGENERATE)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.floats(-3.1, 3.1))
 def test_nodes_on_a_line_or_in_one_place_determine_nothing(seed, yaw):
     rng = np.random.default_rng(seed)

@@ -47,7 +47,7 @@ def van_loan(dimensions, links, gone_s):
     return F, F @ block[:size, size:]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS, DIMENSIONS, st.integers(0, 5), st.floats(0.0, 30.0))
 def test_prediction_is_that_of_the_continuous_model(seed, dimensions, links, gone_s):
     x, P = state(seed, dimensions, links)
@@ -58,7 +58,7 @@ def test_prediction_is_that_of_the_continuous_model(seed, dimensions, links, gon
     assert pytest.approx(expected_P, rel=1e-6, abs=1e-9) == P
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS, DIMENSIONS, st.lists(st.floats(0.0, 5.0), min_size=1, max_size=10))
 def test_prediction_keeps_the_covariance_symmetric_and_positive(seed, dimensions, steps_s):
     x, P = state(seed, dimensions, 3)
@@ -103,7 +103,7 @@ def textbook(x, P, H, innovation, variance):
     return x + K * innovation, P - np.outer(K, H @ P)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS, DIMENSIONS, st.floats(-1.5, 1.5), st.floats(-0.2, 0.2), st.integers(0, 2))
 def test_a_clear_range_of_a_far_anchor_is_a_textbook_kalman_update(seed, dimensions, z, since_s, slot):
     """Far away a distance is linear; without a chance of an obstruction its law is Gaussian but for the outliers."""
@@ -123,7 +123,7 @@ def test_a_clear_range_of_a_far_anchor_is_a_textbook_kalman_update(seed, dimensi
     assert pytest.approx(expected_P, rel=0.02, abs=1e-3) == P
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, DIMENSIONS, st.floats(-3.0, 9.0), st.floats(0.0, 0.97), st.floats(1e-6, 4.0))
 def test_any_range_leaves_a_finite_state_and_a_covariance_that_has_not_grown(seed, dimensions, error_m, nlos, variance):
     x, P = state(seed, dimensions, 2)
@@ -175,7 +175,7 @@ def play(x, P, ranges, *, los=math.nan, link_nlos=None, ahead_s=0.1, gone_s=0.1,
     return codes, deviances, quality
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SEEDS, st.floats(-200.0, 200.0))
 def test_arrivals_of_a_blink_may_all_be_shifted_alike(seed, shift_m):
     arrivals = distances(ROOM, (8.2, 6.1, 1.0)) + np.random.default_rng(seed).normal(0.0, 0.1, len(ROOM))

@@ -26,7 +26,7 @@ def cost(position, anchors, ranges, weights):
     return float(weights @ residual(position, anchors, ranges) ** 2)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, st.integers(4, 10), st.sampled_from([2, 3]))
 def test_it_finds_the_minimum_that_scipy_finds(seed, count, dimensions):
     rng = np.random.default_rng(seed)
@@ -39,7 +39,7 @@ def test_it_finds_the_minimum_that_scipy_finds(seed, count, dimensions):
     assert cost(found, anchors, ranges, weights) <= 1.05 * cost(scipys, anchors, ranges, weights) + 1e-3
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, st.integers(1, 8), st.sampled_from([2, 3]), st.floats(0.0, 100.0))
 def test_the_residual_never_grows_from_any_start_on_any_geometry(seed, count, dimensions, astray_m):
     rng = np.random.default_rng(seed)
