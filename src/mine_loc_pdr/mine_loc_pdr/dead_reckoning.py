@@ -311,10 +311,9 @@ class PedestrianDeadReckoning:
         What the waist did meanwhile also tells where the front of the body is.
         """
         since_ns = step.stamp_ns - to_ns(step.interval_s or 0.5)
-        stamps_ns, orientations, forces = self._between(since_ns, step.stamp_ns)
+        phase_rad, orientations, forces = self._between(since_ns, step.stamp_ns)
         facing = quaternion.rotate(orientations, attitude.forward_imu)[:, :2]
         if step.interval_s is not None:
-            phase_rad = (np.array(stamps_ns) - since_ns) * (math.tau / (step.stamp_ns - since_ns))
             self._front.add(forward_push(phase_rad, _levelled(quaternion.rotate(orientations, forces), facing)))
         east, north = facing.sum(axis=0)
         return math.atan2(north, east)
@@ -337,16 +336,20 @@ class PedestrianDeadReckoning:
         """Of the vertical acceleration, from one lowest point of the waist to the next."""
         lasted_s = FIRST_SWING_S if step.interval_s is None else min(step.interval_s, SLOWEST_STEP_S)
         until_ns = step.stamp_ns + LOWEST_AFTER_STRIKE_NS
-        since_ns = until_ns - to_ns(lasted_s)
-        stamps_ns, orientations, forces = self._between(since_ns, until_ns)
-        phase_rad = (np.array(stamps_ns) - since_ns) * (math.tau / (until_ns - since_ns))
+        phase_rad, orientations, forces = self._between(until_ns - to_ns(lasted_s), until_ns)
         return vertical_swing(phase_rad, quaternion.rotate(orientations, forces)[:, 2])
 
-    def _between(self, since_ns: int, until_ns: int) -> tuple[Sequence[int], Sequence[Quaternion], Sequence[Vector3]]:
-        """Stamps, orientations and forces after `since_ns` and up to `until_ns`; all there are if none are of then."""
+    def _between(
+        self, since_ns: int, until_ns: int
+    ) -> tuple[NDArray[np.float64], Sequence[Quaternion], Sequence[Vector3]]:
+        """Phase, orientations and forces of the samples in (since_ns, until_ns]; of all there are if none are of then.
+
+        The phase (n,) goes from 0 at `since_ns` to 2π at `until_ns`.
+        """
         chosen = [m for m in self._motion if since_ns < m[0] <= until_ns] or self._motion
         stamps_ns, orientations, forces = zip(*chosen, strict=True)
-        return stamps_ns, orientations, forces
+        phase_rad = (np.array(stamps_ns) - since_ns) * (math.tau / (until_ns - since_ns))
+        return phase_rad, orientations, forces
 
     def _carry_drift(self) -> None:
         """Bring the drift model up to the last sample."""
